@@ -1,0 +1,2 @@
+//! The `beamfix` tool.
+fn main() {}

@@ -1,0 +1,19 @@
+//! From the bytes of a cheap laser rangefinder to a trustworthy pose, on a microcontroller.
+//!
+//! ```text
+//! bytes ─▶ packet ─▶ beams ─▶ scan ─▶ points ─▶ match ─▶ pose
+//!       lidar::*          scan               matching    odometry
+//! ```
+//!
+//! Every arrow is a function that can be called and tested alone. Nothing here does I/O, allocates, waits,
+//! keeps a `static` or panics; the same source gives the same bits on a PC and on a Cortex-M0.
+//!
+//! Frames and units: x forward, y left, angles counter-clockwise; metres, radians, seconds in `f32` at
+//! the public doors. Inside, ranges and points are whole millimetres, bearings a 65536th of a turn.
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod geometry;
+pub mod linalg;
+pub mod math;
+pub mod scan;

@@ -1,0 +1,366 @@
+//! Symmetric 3×3 matrices over `(x, y, θ)`: information, covariance, eigenvalues.
+
+use crate::{geometry::Pose, math};
+
+/// Symmetric 3×3 matrix, rows and columns `(x, y, θ)`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Sym3 {
+    /// Row x, column x.
+    pub xx: f32,
+    /// Row x, column y.
+    pub xy: f32,
+    /// Row x, column θ.
+    pub xt: f32,
+    /// Row y, column y.
+    pub yy: f32,
+    /// Row y, column θ.
+    pub yt: f32,
+    /// Row θ, column θ.
+    pub tt: f32,
+}
+
+/// What a match knows about a pose: the inverse of a [`Covariance`] (1/m², 1/(m·rad), 1/rad²).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Information(pub Sym3);
+
+/// How far off a pose may be: variances and their products (m², m·rad, rad²).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Covariance(pub Sym3);
+
+impl Sym3 {
+    /// Matrix with nothing off its diagonal.
+    #[must_use]
+    pub const fn diagonal(xx: f32, yy: f32, tt: f32) -> Self {
+        Self {
+            xx,
+            xy: 0.0,
+            xt: 0.0,
+            yy,
+            yt: 0.0,
+            tt,
+        }
+    }
+
+    /// Matrix times vector.
+    #[must_use]
+    pub fn times(&self, v: [f32; 3]) -> [f32; 3] {
+        let [x, y, t] = v;
+        [
+            self.xx * x + self.xy * y + self.xt * t,
+            self.xy * x + self.yy * y + self.yt * t,
+            self.xt * x + self.yt * y + self.tt * t,
+        ]
+    }
+
+    /// `vᵀ M v`.
+    #[must_use]
+    pub fn quadratic(&self, v: [f32; 3]) -> f32 {
+        let [a, b, c] = self.times(v);
+        a * v[0] + b * v[1] + c * v[2]
+    }
+
+    /// Sum of two matrices.
+    #[must_use]
+    pub fn plus(&self, other: &Self) -> Self {
+        Self {
+            xx: self.xx + other.xx,
+            xy: self.xy + other.xy,
+            xt: self.xt + other.xt,
+            yy: self.yy + other.yy,
+            yt: self.yt + other.yt,
+            tt: self.tt + other.tt,
+        }
+    }
+
+    /// Every entry times `factor`.
+    #[must_use]
+    pub fn scaled(&self, factor: f32) -> Self {
+        Self {
+            xx: self.xx * factor,
+            xy: self.xy * factor,
+            xt: self.xt * factor,
+            yy: self.yy * factor,
+            yt: self.yt * factor,
+            tt: self.tt * factor,
+        }
+    }
+
+    /// `D M D` with `D = diag(1, 1, factor)`: the same matrix with θ in another unit.
+    #[must_use]
+    pub fn theta_scaled(&self, factor: f32) -> Self {
+        Self {
+            xt: self.xt * factor,
+            yt: self.yt * factor,
+            tt: self.tt * factor * factor,
+            ..*self
+        }
+    }
+
+    /// `A M A` for a symmetric `A`.
+    #[must_use]
+    pub fn sandwiched(&self, a: &Self) -> Self {
+        let rows = [
+            a.times([self.xx, self.xy, self.xt]),
+            a.times([self.xy, self.yy, self.yt]),
+            a.times([self.xt, self.yt, self.tt]),
+        ];
+        // Column i of (A M)ᵀ is row i of A M.
+        let column = |i: usize| a.times([rows[0][i], rows[1][i], rows[2][i]]);
+        let ([xx, xy, xt], [_, yy, yt], [_, _, tt]) = (column(0), column(1), column(2));
+        Self {
+            xx,
+            xy,
+            xt,
+            yy,
+            yt,
+            tt,
+        }
+    }
+
+    /// Inverse of a positive definite matrix; `None` where it is singular or indefinite.
+    ///
+    /// Cholesky, so that a matrix which is positive definite but badly scaled still inverts.
+    #[must_use]
+    pub fn inverse(&self) -> Option<Self> {
+        let l = self.cholesky()?;
+        let ([xx, xy, xt], [_, yy, yt], [_, _, tt]) = (
+            l.solve([1.0, 0.0, 0.0]),
+            l.solve([0.0, 1.0, 0.0]),
+            l.solve([0.0, 0.0, 1.0]),
+        );
+        Some(Self {
+            xx,
+            xy,
+            xt,
+            yy,
+            yt,
+            tt,
+        })
+    }
+
+    /// Solution `v` of `M v = b`; `None` unless the matrix is positive definite.
+    #[must_use]
+    pub fn solve(&self, b: [f32; 3]) -> Option<[f32; 3]> {
+        Some(self.cholesky()?.solve(b))
+    }
+
+    /// `M = L D Lᵀ`; `None` where a pivot is not clearly positive.
+    fn cholesky(&self) -> Option<Ldl> {
+        /// A pivot this much smaller than its diagonal entry is only rounding.
+        const SINGULAR: f32 = 1e-6;
+        let d0 = self.xx;
+        if !(d0 > 0.0 && d0 < f32::INFINITY) {
+            return None;
+        }
+        let (l10, l20) = (self.xy / d0, self.xt / d0);
+        let d1 = self.yy - l10 * self.xy;
+        if !(d1 > SINGULAR * self.yy && d1 < f32::INFINITY) {
+            return None;
+        }
+        let l21 = (self.yt - l20 * self.xy) / d1;
+        let d2 = self.tt - l20 * self.xt - l21 * l21 * d1;
+        if !(d2 > SINGULAR * self.tt && d2 < f32::INFINITY) {
+            return None;
+        }
+        Some(Ldl {
+            d: [d0, d1, d2],
+            l10,
+            l20,
+            l21,
+        })
+    }
+
+    /// Eigenvalues in ascending order, each with its unit eigenvector: Jacobi rotations, four sweeps.
+    ///
+    /// Give entries of similar size (see [`Sym3::theta_scaled`]): the error is about 1e-6 of the largest.
+    #[must_use]
+    pub fn eigen(&self) -> [(f32, [f32; 3]); 3] {
+        let mut m = [
+            [self.xx, self.xy, self.xt],
+            [self.xy, self.yy, self.yt],
+            [self.xt, self.yt, self.tt],
+        ];
+        let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        for _ in 0..4 {
+            for (p, q, r) in [(0, 1, 2), (0, 2, 1), (1, 2, 0)] {
+                rotate(&mut m, &mut v, p, q, r);
+            }
+        }
+        let mut pairs = [(m[0][0], v[0]), (m[1][1], v[1]), (m[2][2], v[2])];
+        for (a, b) in [(0, 1), (1, 2), (0, 1)] {
+            if pairs[b].0 < pairs[a].0 {
+                pairs.swap(a, b);
+            }
+        }
+        pairs
+    }
+}
+
+/// One Jacobi rotation that clears `m[p][q]`; `r` is the third index, `v` holds eigenvectors as rows.
+fn rotate(m: &mut [[f32; 3]; 3], v: &mut [[f32; 3]; 3], p: usize, q: usize, r: usize) {
+    let off = m[p][q];
+    if off == 0.0 {
+        return;
+    }
+    let theta = 0.5 * (m[q][q] - m[p][p]) / off;
+    let root = math::sqrt(theta * theta + 1.0);
+    let t = if theta < 0.0 {
+        -1.0 / (root - theta)
+    } else {
+        1.0 / (root + theta)
+    };
+    let c = 1.0 / math::sqrt(t * t + 1.0);
+    let s = t * c;
+    m[p][p] -= t * off;
+    m[q][q] += t * off;
+    m[p][q] = 0.0;
+    m[q][p] = 0.0;
+    let (mpr, mqr) = (m[p][r], m[q][r]);
+    m[p][r] = c * mpr - s * mqr;
+    m[q][r] = s * mpr + c * mqr;
+    m[r][p] = m[p][r];
+    m[r][q] = m[q][r];
+    for k in 0..3 {
+        let (vp, vq) = (v[p][k], v[q][k]);
+        v[p][k] = c * vp - s * vq;
+        v[q][k] = s * vp + c * vq;
+    }
+}
+
+/// Factors of `L D Lᵀ`, `L` with ones on its diagonal.
+struct Ldl {
+    d: [f32; 3],
+    l10: f32,
+    l20: f32,
+    l21: f32,
+}
+
+impl Ldl {
+    fn solve(&self, b: [f32; 3]) -> [f32; 3] {
+        let y1 = b[1] - self.l10 * b[0];
+        let y2 = b[2] - self.l20 * b[0] - self.l21 * y1;
+        let t = y2 / self.d[2];
+        let y = y1 / self.d[1] - self.l21 * t;
+        let x = b[0] / self.d[0] - self.l10 * y - self.l20 * t;
+        [x, y, t]
+    }
+}
+
+impl Information {
+    /// The covariance it stands for; `None` where a direction is not determined.
+    #[must_use]
+    pub fn covariance(&self) -> Option<Covariance> {
+        self.0.inverse().map(Covariance)
+    }
+}
+
+impl Covariance {
+    /// The information it stands for; `None` unless it is positive definite.
+    #[must_use]
+    pub fn information(&self) -> Option<Information> {
+        self.0.inverse().map(Information)
+    }
+
+    /// Turned with the frame: the covariance of a pose given in a frame that `pose` places in another one.
+    ///
+    /// Only the rotation counts: errors of position turn with it, the error of the heading stays.
+    #[must_use]
+    pub fn rotated(&self, pose: Pose) -> Self {
+        let (s, c) = math::sin_cos(pose.theta);
+        let m = &self.0;
+        Self(Sym3 {
+            xx: c * c * m.xx - 2.0 * c * s * m.xy + s * s * m.yy,
+            xy: c * s * (m.xx - m.yy) + (c * c - s * s) * m.xy,
+            xt: c * m.xt - s * m.yt,
+            yy: s * s * m.xx + 2.0 * c * s * m.xy + c * c * m.yy,
+            yt: s * m.xt + c * m.yt,
+            tt: m.tt,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const M: Sym3 = Sym3 {
+        xx: 4.0,
+        xy: 1.0,
+        xt: -0.5,
+        yy: 3.0,
+        yt: 0.25,
+        tt: 2.0,
+    };
+
+    #[test]
+    fn inverse_times_matrix_is_one() {
+        let inverse = M.inverse().expect("positive definite");
+        for (i, unit) in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+            .into_iter()
+            .enumerate()
+        {
+            let back = inverse.times(M.times(unit));
+            for (k, value) in back.into_iter().enumerate() {
+                let expected = if k == i { 1.0 } else { 0.0 };
+                assert!((value - expected).abs() < 1e-6, "{i} {k}: {value}");
+            }
+        }
+    }
+
+    #[test]
+    fn singular_indefinite_and_nan_are_refused() {
+        for m in [
+            Sym3::diagonal(1.0, 0.0, 1.0),
+            Sym3::diagonal(1.0, -1.0, 1.0),
+            Sym3::diagonal(f32::NAN, 1.0, 1.0),
+            Sym3::diagonal(1.0, 1.0, f32::INFINITY),
+            Sym3 {
+                xy: 1.0,
+                ..Sym3::diagonal(1.0, 1.0, 1.0)
+            },
+        ] {
+            assert_eq!(m.inverse(), None, "{m:?}");
+        }
+    }
+
+    #[test]
+    fn eigenvectors_are_stretched_by_their_eigenvalues() {
+        let pairs = M.eigen();
+        assert!(pairs[0].0 <= pairs[1].0 && pairs[1].0 <= pairs[2].0);
+        for (value, vector) in pairs {
+            let image = M.times(vector);
+            let norm: f32 = vector.iter().map(|v| v * v).sum();
+            assert!((norm - 1.0).abs() < 1e-5, "{vector:?}");
+            for k in 0..3 {
+                assert!(
+                    (image[k] - value * vector[k]).abs() < 1e-5,
+                    "{value} {vector:?}"
+                );
+            }
+        }
+        let trace: f32 = pairs.iter().map(|p| p.0).sum();
+        assert!((trace - 9.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn sandwich_with_the_inverse_is_the_inverse() {
+        let inverse = M.inverse().expect("positive definite");
+        let sandwiched = M.sandwiched(&inverse);
+        assert!((sandwiched.xx - inverse.xx).abs() < 1e-6);
+        assert!((sandwiched.yt - inverse.yt).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_quarter_turn_swaps_the_axes_of_a_covariance() {
+        let turned = Covariance(Sym3::diagonal(4.0, 1.0, 0.5)).rotated(Pose::new(
+            9.0,
+            9.0,
+            core::f32::consts::FRAC_PI_2,
+        ));
+        assert!((turned.0.xx - 1.0).abs() < 1e-5 && (turned.0.yy - 4.0).abs() < 1e-5);
+        assert!(turned.0.xy.abs() < 1e-5 && (turned.0.tt - 0.5).abs() < 1e-6);
+    }
+}
