@@ -1,1 +1,3 @@
 //! Host side of beamfix: simulator, readers, pictures.
+
+pub mod sim;

@@ -1,0 +1,22 @@
+//! A robot with a lidar in a world of lines and circles: the same bits in every run on every machine.
+//!
+//! `f64`, the four operations, square roots and `libm`'s functions; random numbers from a seeded ChaCha.
+//!
+//! ```text
+//! scenes ─▶ World ─▶ lidar ─▶ beams ─▶ encoder ─▶ bytes
+//!                    robot ─▶ truth, wheel odometry
+//! ```
+
+pub mod drive;
+pub mod lidar;
+pub mod noise;
+pub mod pose;
+pub mod robot;
+pub mod scenes;
+pub mod world;
+
+pub use drive::{Drive, Settings, drive};
+pub use lidar::{Shot, Still};
+pub use noise::Noise;
+pub use pose::TruePose;
+pub use world::World;

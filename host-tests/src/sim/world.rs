@@ -1,0 +1,174 @@
+//! What the lidar sees: line segments and circles, cast exactly.
+
+use super::noise::Noise;
+
+/// A straight wall from one point to another (m).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Segment {
+    /// Start.
+    pub from: [f64; 2],
+    /// End.
+    pub to: [f64; 2],
+}
+
+/// A round column (m).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Circle {
+    /// Centre.
+    pub centre: [f64; 2],
+    /// Radius.
+    pub radius: f64,
+}
+
+/// All that stands around.
+#[derive(Debug, Clone, Default)]
+pub struct World {
+    /// Straight faces.
+    pub segments: Vec<Segment>,
+    /// Round ones.
+    pub circles: Vec<Circle>,
+}
+
+impl World {
+    /// Adds one straight face.
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2]) {
+        self.segments.push(Segment { from, to });
+    }
+
+    /// Adds the four faces of the box between two opposite corners.
+    pub fn block(&mut self, low: [f64; 2], high: [f64; 2]) {
+        let middle = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])];
+        self.turned_block(middle, [high[0] - low[0], high[1] - low[1]], 0.0);
+    }
+
+    /// Adds a box of `size` around `middle`, turned by `angle` (rad).
+    pub fn turned_block(&mut self, middle: [f64; 2], size: [f64; 2], angle: f64) {
+        let (s, c) = (libm::sin(angle), libm::cos(angle));
+        let corner = |u: f64, v: f64| {
+            let (dx, dy) = (0.5 * u * size[0], 0.5 * v * size[1]);
+            [middle[0] + c * dx - s * dy, middle[1] + s * dx + c * dy]
+        };
+        let corners = [
+            corner(-1.0, -1.0),
+            corner(1.0, -1.0),
+            corner(1.0, 1.0),
+            corner(-1.0, 1.0),
+        ];
+        for k in 0..4 {
+            self.line(corners[k], corners[(k + 1) % 4]);
+        }
+    }
+
+    /// Adds a column.
+    pub fn column(&mut self, centre: [f64; 2], radius: f64) {
+        self.circles.push(Circle { centre, radius });
+    }
+
+    /// Adds four thin legs at the corners of a table or a chair.
+    pub fn legs(&mut self, middle: [f64; 2], size: [f64; 2], radius: f64) {
+        for (u, v) in [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)] {
+            self.column([middle[0] + u * size[0], middle[1] + v * size[1]], radius);
+        }
+    }
+
+    /// Adds `count` boxes of 0.2 to 1.2 m at random places and angles inside `low`..`high`.
+    pub fn clutter(&mut self, low: [f64; 2], high: [f64; 2], count: usize, noise: &mut Noise) {
+        for _ in 0..count {
+            let middle = [noise.even(low[0], high[0]), noise.even(low[1], high[1])];
+            let size = [noise.even(0.2, 1.2), noise.even(0.2, 1.2)];
+            self.turned_block(middle, size, noise.even(0.0, core::f64::consts::PI));
+        }
+    }
+
+    /// Distance (m) from `from` along the unit vector `towards` to the first face, if there is one.
+    #[must_use]
+    pub fn cast(&self, from: [f64; 2], towards: [f64; 2]) -> Option<f64> {
+        let straight = self.segments.iter().filter_map(|s| s.cast(from, towards));
+        let round = self.circles.iter().filter_map(|c| c.cast(from, towards));
+        straight
+            .chain(round)
+            .reduce(|a, b| if a < b { a } else { b })
+    }
+
+    /// Distance (m) from `place` to the nearest face; infinite in an empty world.
+    #[must_use]
+    pub fn clearance(&self, place: [f64; 2]) -> f64 {
+        let straight = self.segments.iter().map(|s| s.distance(place));
+        let round = self.circles.iter().map(|c| c.distance(place));
+        straight
+            .chain(round)
+            .fold(f64::INFINITY, |a, b| if a < b { a } else { b })
+    }
+}
+
+impl Segment {
+    fn cast(&self, from: [f64; 2], towards: [f64; 2]) -> Option<f64> {
+        let along = [self.to[0] - self.from[0], self.to[1] - self.from[1]];
+        let start = [self.from[0] - from[0], self.from[1] - from[1]];
+        let across = towards[0] * along[1] - towards[1] * along[0];
+        if across == 0.0 {
+            return None;
+        }
+        let range = (start[0] * along[1] - start[1] * along[0]) / across;
+        let place = (start[0] * towards[1] - start[1] * towards[0]) / across;
+        (range > 0.0 && (0.0..=1.0).contains(&place)).then_some(range)
+    }
+
+    fn distance(&self, place: [f64; 2]) -> f64 {
+        let along = [self.to[0] - self.from[0], self.to[1] - self.from[1]];
+        let start = [place[0] - self.from[0], place[1] - self.from[1]];
+        let square = along[0] * along[0] + along[1] * along[1];
+        let share = ((start[0] * along[0] + start[1] * along[1]) / square).clamp(0.0, 1.0);
+        let off = [start[0] - share * along[0], start[1] - share * along[1]];
+        libm::sqrt(off[0] * off[0] + off[1] * off[1])
+    }
+}
+
+impl Circle {
+    fn cast(&self, from: [f64; 2], towards: [f64; 2]) -> Option<f64> {
+        let to = [self.centre[0] - from[0], self.centre[1] - from[1]];
+        let along = to[0] * towards[0] + to[1] * towards[1];
+        let across = to[0] * towards[1] - to[1] * towards[0];
+        let square = self.radius * self.radius - across * across;
+        if square < 0.0 {
+            return None;
+        }
+        let half = libm::sqrt(square);
+        // From inside, the near crossing lies behind.
+        [along - half, along + half]
+            .into_iter()
+            .find(|&range| range > 0.0)
+    }
+
+    fn distance(&self, place: [f64; 2]) -> f64 {
+        let off = [place[0] - self.centre[0], place[1] - self.centre[1]];
+        (libm::sqrt(off[0] * off[0] + off[1] * off[1]) - self.radius).abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_end_at_the_first_face() {
+        let mut world = World::default();
+        world.block([2.0, -1.0], [3.0, 1.0]);
+        world.column([0.0, 5.0], 1.0);
+        for (towards, expected) in [
+            ([1.0, 0.0], Some(2.0)),
+            ([0.0, 1.0], Some(4.0)),
+            ([-1.0, 0.0], None),
+            ([0.6, 0.8], None),
+        ] {
+            assert_eq!(world.cast([0.0, 0.0], towards), expected, "{towards:?}");
+        }
+        assert_eq!(
+            world.cast([0.0, 5.0], [1.0, 0.0]),
+            Some(1.0),
+            "from inside the column"
+        );
+        assert_eq!(world.clearance([0.0, 0.0]), 2.0);
+        assert_eq!(world.clearance([0.0, 3.5]), 0.5);
+    }
+}
