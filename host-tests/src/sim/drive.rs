@@ -139,8 +139,5 @@ mod tests {
         );
         assert!(run.clearance > 0.18, "clearance {} m", run.clearance);
         assert!(run.start.between(end).distance() < 0.05, "{end:?}");
-            "{seconds} s {} m {:?} clearance {}",
-            run.distance, end, run.clearance
-        );
     }
 }
