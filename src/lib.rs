@@ -14,6 +14,7 @@
 #![forbid(unsafe_code)]
 
 pub mod geometry;
+pub mod lidar;
 pub mod linalg;
 pub mod math;
 pub mod scan;

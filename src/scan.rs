@@ -1,7 +1,9 @@
 //! One revolution of beams, and what a matcher needs of it.
 
+pub mod assembler;
 pub mod beam;
 
+pub use assembler::Assembler;
 pub use beam::{Beam, Bearing, NoReturn, Range};
 
 use heapless::Vec;

@@ -1,4 +1,6 @@
 //! Host side of beamfix: simulator, readers, pictures.
 
+pub mod decode;
+pub mod encoder;
 pub mod readers;
 pub mod sim;

@@ -1,0 +1,127 @@
+//! The LDROBOT 47-byte frame.
+
+use std::f64::consts::TAU;
+
+use super::{Echo, Encoder};
+
+/// Points of a frame.
+pub const POINTS: usize = 12;
+
+/// What a frame says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// Speed of the motor (deg/s).
+    pub speed_deg_per_s: u16,
+    /// Clockwise angle of the first point (0.01°).
+    pub start_cdeg: u16,
+    /// Clockwise angle of the last point (0.01°).
+    pub end_cdeg: u16,
+    /// Time stamp, 0…29 999 (ms).
+    pub stamp_ms: u16,
+    /// Range (mm, 0 for none) and intensity.
+    pub points: [(u16, u8); POINTS],
+}
+
+impl Frame {
+    /// The bytes on the wire.
+    #[must_use]
+    pub fn bytes(&self) -> [u8; 47] {
+        let mut bytes = vec![0x54, 0x2c];
+        bytes.extend(self.speed_deg_per_s.to_le_bytes());
+        bytes.extend(self.start_cdeg.to_le_bytes());
+        for (mm, intensity) in self.points {
+            bytes.extend(mm.to_le_bytes());
+            bytes.push(intensity);
+        }
+        bytes.extend(self.end_cdeg.to_le_bytes());
+        bytes.extend(self.stamp_ms.to_le_bytes());
+        bytes.push(crc8(&bytes));
+        bytes.try_into().expect("47 bytes")
+    }
+}
+
+/// CRC-8 with polynomial 0x4D, bit by bit.
+#[must_use]
+pub fn crc8(bytes: &[u8]) -> u8 {
+    bytes.iter().fold(0, |crc, byte| {
+        (0..8).fold(crc ^ byte, |crc: u8, _| {
+            (crc << 1) ^ if crc & 0x80 != 0 { 0x4d } else { 0 }
+        })
+    })
+}
+
+/// A sensor that turns steadily and measures steadily; its frames are not aligned to its turns.
+#[derive(Debug, Clone)]
+pub struct Sensor {
+    points_per_s: f64,
+    turns_per_s: f64,
+    /// Where the first beam points, clockwise (turns).
+    phase: f64,
+    /// Beams measured.
+    count: u64,
+    points: Vec<(u16, u8)>,
+}
+
+impl Sensor {
+    /// LD06: 4500 points and 10 turns a second.
+    #[must_use]
+    pub fn ld06() -> Self {
+        Self::new(4500.0, 10.0, 0.123)
+    }
+
+    /// A sensor of the family; `phase` (turns) is where its first beam points, clockwise.
+    #[must_use]
+    pub fn new(points_per_s: f64, turns_per_s: f64, phase: f64) -> Self {
+        Self {
+            points_per_s,
+            turns_per_s,
+            phase,
+            count: 0,
+            points: Vec::new(),
+        }
+    }
+
+    fn time_s(&self, beam: u64) -> f64 {
+        beam as f64 / self.points_per_s
+    }
+
+    /// Clockwise angle, in turns, within [0, 1).
+    fn angle(&self, beam: u64) -> f64 {
+        (self.phase + self.turns_per_s * self.time_s(beam)).rem_euclid(1.0)
+    }
+
+    fn cdeg(&self, beam: u64) -> u16 {
+        (self.angle(beam) * 36_000.0).round() as u16 % 36_000
+    }
+}
+
+impl Encoder for Sensor {
+    fn next_time_us(&self) -> f64 {
+        self.time_s(self.count) * 1e6
+    }
+
+    fn fire(&mut self, look: &mut dyn FnMut(f64, f64) -> Option<Echo>, line: &mut Vec<u8>) {
+        let echo = look(self.next_time_us(), -self.angle(self.count) * TAU);
+        self.points.push(match echo {
+            Some(echo) => (
+                echo.range_mm.round().clamp(0.0, 65_535.0) as u16,
+                echo.intensity,
+            ),
+            None => (0, 0),
+        });
+        self.count += 1;
+        let Ok(points) = <[(u16, u8); POINTS]>::try_from(&self.points[..]) else {
+            return;
+        };
+        self.points.clear();
+        let first = self.count - POINTS as u64;
+        let frame = Frame {
+            speed_deg_per_s: (self.turns_per_s * 360.0).round() as u16,
+            start_cdeg: self.cdeg(first),
+            end_cdeg: self.cdeg(self.count - 1),
+            stamp_ms: ((self.time_s(first) * 1e3) as u64 % 30_000) as u16,
+            points,
+        };
+        line.extend(frame.bytes());
+    }
+}

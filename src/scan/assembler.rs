@@ -1,0 +1,163 @@
+//! Beams one after the other to whole turns.
+
+use super::{Beam, Scan};
+
+/// Collects the beams of one turn after the other.
+///
+/// Each beam keeps its own bearing, range and time; nothing is binned. 8·N + 56 bytes: one scan, and the one beam
+/// that is already the next turn's when a turn is complete.
+///
+/// ```
+/// # use beamfix::scan::{Assembler, Beam, Bearing, Range};
+/// let mut assembler = Assembler::<16>::new();
+/// for k in 0..20u32 {
+///     let beam = Beam { bearing: Bearing(0), range: Range::from_mm(1000), time_us: 100 * k, quality: 0 };
+///     let ready = assembler.push(beam, k % 8 == 3);
+///     assert_eq!(ready, k == 11 || k == 19);
+///     if ready {
+///         assert_eq!(assembler.scan().len(), 8);
+///     }
+/// }
+/// ```
+#[derive(Debug, Clone)]
+pub struct Assembler<const N: usize> {
+    scan: Scan<N>,
+    state: State,
+    refused: u32,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum State {
+    /// The first turn is incomplete: nobody knows how much of it is missing.
+    Partial,
+    /// The scan began with a turn.
+    Whole,
+    /// The scan is a whole turn; this beam is the next one's first.
+    Ready(Beam),
+}
+
+impl<const N: usize> Assembler<N> {
+    /// No beams.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            scan: Scan::new(),
+            state: State::Partial,
+            refused: 0,
+        }
+    }
+
+    /// Takes the next beam; `true` when [`Assembler::scan`] is a whole turn.
+    ///
+    /// `turn_starts` says that this beam is the first of a turn. The scan stays until the next push.
+    pub fn push(&mut self, beam: Beam, turn_starts: bool) -> bool {
+        match self.state {
+            State::Ready(first) => {
+                self.scan.clear();
+                self.keep(first);
+                self.state = State::Whole;
+                if turn_starts {
+                    self.state = State::Ready(beam);
+                    return true;
+                }
+            }
+            State::Whole if turn_starts => {
+                self.state = State::Ready(beam);
+                return true;
+            }
+            State::Partial if turn_starts => {
+                self.scan.clear();
+                self.state = State::Whole;
+            }
+            State::Partial => return false,
+            State::Whole => {}
+        }
+        self.keep(beam);
+        false
+    }
+
+    /// The turn that the last push completed, or what there is of the present one.
+    #[must_use]
+    pub fn scan(&self) -> &Scan<N> {
+        &self.scan
+    }
+
+    /// Beams that found no room because a turn had more than N; wraps.
+    #[must_use]
+    pub fn refused_beams(&self) -> u32 {
+        self.refused
+    }
+
+    /// Forgets the present turn: after a pause, the next whole turn is the first one reported.
+    pub fn restart(&mut self) {
+        self.scan.clear();
+        self.state = State::Partial;
+    }
+
+    fn keep(&mut self, beam: Beam) {
+        if self.scan.push(beam).is_err() {
+            self.refused = self.refused.wrapping_add(1);
+        }
+    }
+}
+
+impl<const N: usize> Default for Assembler<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::{Bearing, Range};
+
+    fn beam(k: u32) -> Beam {
+        Beam {
+            bearing: Bearing(k as u16),
+            range: Range::from_mm(1000 + k),
+            time_us: 160 * k,
+            quality: 1,
+        }
+    }
+
+    #[test]
+    fn every_beam_of_every_whole_turn_is_kept_once() {
+        let mut assembler = Assembler::<8>::new();
+        let mut next = 3;
+        for k in 0..40 {
+            if assembler.push(beam(k), k % 5 == 3) {
+                for got in assembler.scan().beams() {
+                    assert_eq!(got, beam(next));
+                    next += 1;
+                }
+                assert_eq!(next, k);
+            }
+        }
+        assert_eq!((next, assembler.refused_beams()), (38, 0));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_counted() {
+        let mut assembler = Assembler::<4>::new();
+        let mut turns = 0;
+        for k in 0..21 {
+            if assembler.push(beam(k), k % 10 == 0) {
+                assert_eq!(assembler.scan().len(), 4);
+                turns += 1;
+            }
+        }
+        assert_eq!((turns, assembler.refused_beams()), (2, 12));
+    }
+
+    #[test]
+    fn turns_of_a_single_beam_and_a_restart() {
+        let mut assembler = Assembler::<4>::new();
+        let ready: [bool; 4] = core::array::from_fn(|k| assembler.push(beam(k as u32), true));
+        assert_eq!(ready, [false, true, true, true]);
+        assert_eq!(assembler.scan().beams().next(), Some(beam(2)));
+        assembler.restart();
+        assert!(assembler.scan().is_empty());
+        assert!(!assembler.push(beam(9), false) && assembler.scan().is_empty());
+    }
+}
