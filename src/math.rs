@@ -12,7 +12,7 @@
 //! | [`ln`] | normal, positive | 1e-7 relative to max(1, ‖ln x‖) | about 60 |
 //! | [`weight_exp`] | −80…0 | 2.5e-3 relative | about 15 |
 //! | [`sin_cos_q15`] | all bearings | 1.3 units in the last place (4e-5) | about 15 |
-//! | [`atan2_turn`] | all but (0, 0) | 0.75 of 1/65536 turn (0.0041°) | about 30 |
+//! | [`atan2_turn`] | all but (0, 0) | 1.1 of 1/65536 turn (0.006°) | about 30 |
 //! | [`isqrt`] | all `u32` | exact floor | about 120 |
 
 pub mod turn;
