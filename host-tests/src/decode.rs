@@ -3,11 +3,12 @@
 use std::fmt;
 
 use beamfix::lidar::{Counters, Packet, Protocol, Sample, ld06};
+use beamfix::scan::Beam;
 
 /// Sensors that [`decode`] knows, by the names that the tool takes.
 pub const NAMES: &[&str] = &["ld06"];
 
-/// One measurement of a decoded stream, in the sensor's own terms.
+/// One measurement of a decoded stream: as the sensor itself gives it, and as the library's beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
     /// Turns begun before it.
@@ -20,6 +21,10 @@ pub struct Row {
     pub range_mm: Option<f32>,
     /// Strength of the return in the sensor's own unit.
     pub quality: u16,
+    /// The same for matching.
+    pub beam: Beam,
+    /// Whether it is the first of a turn.
+    pub turn_starts: bool,
 }
 
 /// What a whole stream held.
@@ -69,7 +74,8 @@ fn run<P: Protocol>(mut parser: P, bytes: &[u8], sink: &mut dyn FnMut(Row)) -> S
     let mut summary = Summary::default();
     let mut take = |packet: P::Packet| {
         for (k, (sample, beam)) in packet.samples().zip(packet.beams()).enumerate() {
-            summary.scans += u32::from(packet.turn_start() == Some(k));
+            let turn_starts = packet.turn_start() == Some(k);
+            summary.scans += u32::from(turn_starts);
             summary.points += 1;
             let Sample {
                 angle_deg,
@@ -82,6 +88,8 @@ fn run<P: Protocol>(mut parser: P, bytes: &[u8], sink: &mut dyn FnMut(Row)) -> S
                 angle_deg,
                 range_mm,
                 quality,
+                beam,
+                turn_starts,
             });
         }
     };

@@ -3,7 +3,7 @@
 //! `f64`, the four operations, square roots and `libm`'s functions; random numbers from a seeded ChaCha.
 //!
 //! ```text
-//! scenes ─▶ World ─▶ lidar ─▶ beams ─▶ encoder ─▶ bytes
+//! scenes ─▶ World ─▶ lidar ─▶ echoes ─▶ encoder ─▶ bytes
 //!                    robot ─▶ truth, wheel odometry
 //! ```
 
@@ -16,7 +16,7 @@ pub mod scenes;
 pub mod world;
 
 pub use drive::{Drive, Settings, drive};
-pub use lidar::{Shot, Still};
+pub use lidar::{Ranging, Still};
 pub use noise::Noise;
 pub use pose::TruePose;
 pub use world::World;

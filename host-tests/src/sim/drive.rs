@@ -1,11 +1,12 @@
-//! A whole run: the robot drives, the lidar turns, every shot is cast from where the lidar is at its time.
+//! A whole run: the robot drives, the lidar turns, every beam is cast from where the lidar is at its time.
 
-use super::lidar::{Ranging, Shot, quality};
+use super::lidar::{Ranging, quality};
 use super::noise::Noise;
 use super::pose::TruePose;
 use super::robot::{PERIOD, Robot, WheelErrors};
 use super::scenes;
 use super::world::World;
+use crate::encoder::{Echo, Encoder};
 
 /// What to simulate.
 #[derive(Debug, Clone)]
@@ -14,13 +15,7 @@ pub struct Settings {
     pub seed: u64,
     /// Longest run (s); it also ends where the way does. Default 120.
     pub seconds: f64,
-    /// Measurements per second. Default 4500: the LD06.
-    pub shots_per_s: f64,
-    /// Turns per second. Default 10.
-    pub turns_per_s: f64,
-    /// Whether the lidar turns clockwise seen from above. Default true: the LD06.
-    pub clockwise: bool,
-    /// The lidar on the robot (m, rad). Default at the middle, looking ahead.
+    /// The lidar on the robot (m, rad). Default 8 cm ahead of the axle, looking ahead.
     pub mount: TruePose,
     /// What the lidar can measure.
     pub ranging: Ranging,
@@ -33,111 +28,108 @@ impl Settings {
     pub const DEFAULT: Self = Self {
         seed: 1,
         seconds: 120.0,
-        shots_per_s: 4500.0,
-        turns_per_s: 10.0,
-        clockwise: true,
-        mount: TruePose::new(0.0, 0.0, 0.0),
+        mount: TruePose::new(0.08, 0.0, 0.0),
         ranging: Ranging::DEFAULT,
         wheels: WheelErrors::DEFAULT,
     };
 }
 
-/// A finished run. The vectors have an entry a shot.
+/// State of the robot when a beam was measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// Since the start (s).
+    pub time: f64,
+    /// Where the robot was, in the world's frame.
+    pub truth: TruePose,
+    /// Where its wheels said it was, in a frame of their own.
+    pub wheels: TruePose,
+}
+
+/// A finished run.
 #[derive(Debug, Clone)]
 pub struct Drive {
     /// Where it took place.
     pub world: World,
-    /// Where the robot started; poses below are in the world's frame too.
-    pub start: TruePose,
-    /// All measurements in order.
-    pub shots: Vec<Shot>,
-    /// The robot's true pose at each.
-    pub truth: Vec<TruePose>,
-    /// The latest pose by wheel odometry at each, in the wheels' own frame.
-    pub wheels: Vec<TruePose>,
+    /// What came over the lidar's line.
+    pub bytes: Vec<u8>,
+    /// The robot at each beam, in order.
+    pub moments: Vec<Moment>,
     /// Metres driven.
     pub distance: f64,
     /// Nearest that the robot's middle came to anything (m).
     pub clearance: f64,
 }
 
-/// Drives one round through the flat.
+/// Drives one round through the flat with `sensor` on board.
 #[must_use]
-pub fn drive(settings: &Settings) -> Drive {
+pub fn drive(settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
     let world = scenes::flat();
     let (start, way) = scenes::flat_round();
     let mut robot = Robot::new(start, way, settings.wheels, Noise::new(settings.seed, 1));
-    let mut range_noise = Noise::new(settings.seed, 2);
-    let mut motor_noise = Noise::new(settings.seed, 3);
-    let mut run = Drive {
-        world,
-        start,
-        shots: Vec::new(),
-        truth: Vec::new(),
-        wheels: Vec::new(),
-        distance: 0.0,
-        clearance: f64::INFINITY,
-    };
-    let step = 1.0 / settings.shots_per_s;
-    let (mut shot, mut bearing) = (0u64, 0.0);
+    let mut noise = Noise::new(settings.seed, 2);
+    let (mut bytes, mut moments) = (Vec::new(), Vec::new());
+    let mut clearance = f64::INFINITY;
     let mut now = 0.0;
-    let mut period = 0u64;
-    loop {
-        let begins = period as f64 * PERIOD;
-        if begins >= settings.seconds || robot.arrived() {
+    for period in 1.. {
+        if now >= settings.seconds || robot.arrived() {
             break;
         }
         robot.steer();
         robot.read_wheels();
-        // The motor's speed wanders by a few thousandths.
-        let turns = settings.turns_per_s * (1.0 + motor_noise.normal(0.002));
-        let turned =
-            core::f64::consts::TAU * turns * step * if settings.clockwise { -1.0 } else { 1.0 };
-        let ends = (period + 1) as f64 * PERIOD;
-        while (shot as f64) * step < ends {
-            let time = shot as f64 * step;
-            robot.advance(time - now);
-            now = time;
-            let sensor = robot.pose.then(settings.mount);
-            let mm = settings
-                .ranging
-                .measure(&run.world, sensor, bearing, &mut range_noise);
-            run.shots.push(Shot {
-                time,
-                bearing,
-                range_mm: mm,
-                quality: quality(mm),
-            });
-            run.truth.push(robot.pose);
-            run.wheels.push(robot.wheels);
-            bearing += turned;
-            shot += 1;
+        let ends = f64::from(period) * PERIOD;
+        while sensor.next_time_us() < ends * 1e6 {
+            let mut look = |time_us: f64, bearing: f64| {
+                let time = time_us * 1e-6;
+                robot.advance(time - now);
+                now = time;
+                moments.push(Moment {
+                    time,
+                    truth: robot.pose,
+                    wheels: robot.wheels,
+                });
+                let lidar = robot.pose.then(settings.mount);
+                let range_mm = settings
+                    .ranging
+                    .measure(&world, lidar, bearing, &mut noise)?;
+                Some(Echo {
+                    range_mm,
+                    intensity: quality(Some(range_mm)),
+                })
+            };
+            sensor.fire(&mut look, &mut bytes);
         }
         robot.advance(ends - now);
         now = ends;
-        let room = run.world.clearance([robot.pose.x, robot.pose.y]);
-        run.clearance = run.clearance.min(room);
-        period += 1;
+        clearance = clearance.min(world.clearance([robot.pose.x, robot.pose.y]));
     }
-    run.distance = robot.driven;
-    run
+    Drive {
+        world,
+        bytes,
+        moments,
+        distance: robot.driven,
+        clearance,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encoder::ld06::Sensor;
 
     #[test]
     fn the_round_is_long_enough_touches_nothing_and_ends_where_it_began() {
-        let run = drive(&Settings::DEFAULT);
-        let seconds = run.shots.last().expect("shots").time;
-        let end = *run.truth.last().expect("shots");
+        let run = drive(&Settings::DEFAULT, &mut Sensor::ld06());
+        let (first, last) = (run.moments[0], run.moments[run.moments.len() - 1]);
         assert!(
-            seconds >= 60.0 && run.distance >= 30.0,
-            "{seconds} s, {} m",
+            last.time >= 60.0 && run.distance >= 30.0,
+            "{} s, {} m",
+            last.time,
             run.distance
         );
         assert!(run.clearance > 0.18, "clearance {} m", run.clearance);
-        assert!(run.start.between(end).distance() < 0.05, "{end:?}");
+        assert!(
+            first.truth.between(last.truth).distance() < 0.05,
+            "{last:?}"
+        );
     }
 }

@@ -1,23 +1,10 @@
-//! The simulated lidar: one shot at a time, from where it is at that moment.
+//! What a simulated lidar measures: one beam from where it is at that moment.
 
 use beamfix::scan::{Beam, Bearing, Range};
 
 use super::noise::Noise;
 use super::pose::TruePose;
 use super::world::World;
-
-/// One measurement before it becomes bytes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shot {
-    /// Since the run's start (s).
-    pub time: f64,
-    /// Direction in the sensor's plane, counter-clockwise (rad), any number of turns.
-    pub bearing: f64,
-    /// Distance (mm), or none where nothing came back.
-    pub range_mm: Option<u32>,
-    /// Strength of the return, 0 without one.
-    pub quality: u8,
-}
 
 /// What a sensor can measure.
 #[derive(Debug, Clone, Copy)]
@@ -38,14 +25,14 @@ impl Ranging {
         farthest: 12.0,
     };
 
-    /// Range (mm, rounded) from `sensor` in the direction `bearing` (rad, counter-clockwise from its front).
+    /// Range (mm, with noise) from `sensor` in the direction `bearing` (rad, counter-clockwise from its front).
     pub fn measure(
         &self,
         world: &World,
         sensor: TruePose,
         bearing: f64,
         noise: &mut Noise,
-    ) -> Option<u32> {
+    ) -> Option<f64> {
         let direction = sensor.theta + bearing;
         let towards = [libm::cos(direction), libm::sin(direction)];
         // Drawn in any case, so that a shot's noise does not depend on the shots before it.
@@ -53,7 +40,7 @@ impl Ranging {
         let range = world.cast([sensor.x, sensor.y], towards)? + error;
         (self.nearest..=self.farthest)
             .contains(&range)
-            .then(|| libm::round(range * 1000.0) as u32)
+            .then_some(range * 1000.0)
     }
 }
 
@@ -91,7 +78,7 @@ impl Still {
                 let mm = self.ranging.measure(world, sensor, bearing, noise);
                 Beam {
                     bearing: Bearing::from_radians(bearing as f32),
-                    range: Range::from_mm(mm.unwrap_or(0)),
+                    range: Range::from_mm(libm::round(mm.unwrap_or(0.0)) as u32),
                     time_us: 0,
                     quality: quality(mm),
                 }
@@ -102,6 +89,6 @@ impl Still {
 
 /// Strength of a return: falls with the distance, as on the sensors.
 #[must_use]
-pub fn quality(range_mm: Option<u32>) -> u8 {
-    range_mm.map_or(0, |mm| 250 - (mm / 64).min(200) as u8)
+pub fn quality(range_mm: Option<f64>) -> u8 {
+    range_mm.map_or(0, |mm| 250 - (mm / 64.0).clamp(0.0, 200.0) as u8)
 }
