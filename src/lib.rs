@@ -16,5 +16,7 @@
 pub mod geometry;
 pub mod lidar;
 pub mod linalg;
+pub mod matching;
 pub mod math;
+pub mod odometry;
 pub mod scan;

@@ -264,6 +264,26 @@ impl Covariance {
         self.0.inverse().map(Information)
     }
 
+    /// Sum of two independent errors.
+    #[must_use]
+    pub fn plus(&self, other: &Self) -> Self {
+        Self(self.0.plus(&other.0))
+    }
+
+    /// The same error seen `(dx, dy)` (m) farther on, where an error of heading also is one of position.
+    #[must_use]
+    pub fn carried(&self, dx: f32, dy: f32) -> Self {
+        let m = &self.0;
+        Self(Sym3 {
+            xx: m.xx - 2.0 * dy * m.xt + dy * dy * m.tt,
+            xy: m.xy + dx * m.xt - dy * m.yt - dx * dy * m.tt,
+            xt: m.xt - dy * m.tt,
+            yy: m.yy + 2.0 * dx * m.yt + dx * dx * m.tt,
+            yt: m.yt + dx * m.tt,
+            tt: m.tt,
+        })
+    }
+
     /// Turned with the frame: the covariance of a pose given in a frame that `pose` places in another one.
     ///
     /// Only the rotation counts: errors of position turn with it, the error of the heading stays.
@@ -351,6 +371,17 @@ mod tests {
         let sandwiched = M.sandwiched(&inverse);
         assert!((sandwiched.xx - inverse.xx).abs() < 1e-6);
         assert!((sandwiched.yt - inverse.yt).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_error_of_heading_becomes_one_of_position_farther_on() {
+        let carried = Covariance(Sym3::diagonal(0.0, 0.0, 0.01)).carried(2.0, 0.0);
+        assert!((carried.0.yy - 0.04).abs() < 1e-7 && carried.0.xx.abs() < 1e-7);
+        assert!((carried.0.yt - 0.02).abs() < 1e-7);
+        let there_and_back = Covariance(M).carried(0.3, -0.7).carried(-0.3, 0.7);
+        assert!(
+            (there_and_back.0.xx - M.xx).abs() < 1e-5 && (there_and_back.0.xy - M.xy).abs() < 1e-5
+        );
     }
 
     #[test]

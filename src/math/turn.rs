@@ -63,6 +63,29 @@ pub const fn sin_cos_q15(turn: u16) -> (i32, i32) {
     )
 }
 
+/// Sine and cosine of `turn` (2⁻³² turn), in this order, Q15 with 1 held as 32768.
+///
+/// For one rotation that is applied to many points: the angle is used whole, and the factors are rounded once, so
+/// that what is rotated is right to 2e-5 of its length.
+#[must_use]
+pub const fn sin_cos_q15_fine(turn: u32) -> (i32, i32) {
+    let entry = (turn.wrapping_add(1 << 21) >> 22) as usize;
+    // The rest is below 2²¹; 2π/2³² in Q45 is 51 472: radians in Q30 after a shift by 15.
+    let rest = (turn.wrapping_add(1 << 21) & ((1 << 22) - 1)) as i64 - (1 << 21);
+    let delta = (rest * 51_472) >> 15;
+    let (s, c) = (SINE[entry] as i64, SINE[entry + 256] as i64);
+    // The table's 32767 for 1 is stretched to 32768; second order, since here the angle may not shrink.
+    let half_square = (delta * delta) >> 31;
+    let turned_s = (s << 15) + ((delta * c) >> 15) - ((half_square * s) >> 15);
+    let turned_c = (c << 15) - ((delta * s) >> 15) - ((half_square * c) >> 15);
+    (stretch(turned_s), stretch(turned_c))
+}
+
+/// From Q30 with 1 held as 32767/32768 to Q15 with 1 held as 32768.
+const fn stretch(v: i64) -> i32 {
+    ((v + (v >> 15) + (1 << 14)) >> 15) as i32
+}
+
 /// Direction of `(x, y)` in 1/65536 turn; 0 for (0, 0).
 ///
 /// Any common scale; magnitudes up to 2³⁰. One division and a table of 65 arcs with linear interpolation.

@@ -1,0 +1,133 @@
+//! Finding the motion between two scans, or between a scan and a map.
+//!
+//! Matchers share a shape, `align(reference, points, guess, config) -> Result<Match, MatchError>`. `Ok` means usable.
+
+pub mod icp;
+
+use core::fmt;
+
+use crate::{
+    geometry::Pose,
+    linalg::{Covariance, Information},
+};
+
+/// A pose found, and how far it can be trusted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Match {
+    /// Pose of the current lidar in the reference's frame.
+    pub pose: Pose,
+    /// How far off `pose` may be: position in the reference's frame, heading (m², m·rad, rad²).
+    pub covariance: Covariance,
+    /// What the scan alone says about the pose: the curvature of the cost, without any prior (1/m², 1/rad²).
+    pub information: Information,
+    /// Beams that agree with the reference.
+    pub inliers: u16,
+    /// Beams that met a part of the reference that could have answered.
+    pub overlap: u16,
+    /// Beams given.
+    pub beams: u16,
+    /// How well the pose explains the scan: about 1 where every beam agrees, 0 where none does, negative where the
+    /// reference saw through what the scan hit.
+    pub score: f32,
+    /// Root mean square distance of the inliers from the reference's lines (m).
+    pub residual: f32,
+    /// The direction that the scene hardly determines, if there is one.
+    pub weak: Option<WeakDirection>,
+    /// Passes over the beams.
+    pub iterations: u8,
+}
+
+/// A direction of motion that leaves the match as good as before: along a corridor, about a round room's centre.
+///
+/// Along it `Match::pose` keeps the guess.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct WeakDirection {
+    /// Unit vector over (x, y, heading · lever), in the reference's frame.
+    pub direction: [f32; 3],
+    /// What makes a heading comparable with a distance: the points' mean distance (m).
+    pub lever: f32,
+    /// Standard deviation along it by the scan alone (m).
+    pub sigma: f32,
+}
+
+/// Why there is no pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum MatchError {
+    /// The scan has too few beams with a range.
+    TooFewBeams {
+        /// How many it has.
+        found: u16,
+        /// How many a match needs.
+        needed: u16,
+    },
+    /// The reference has too few surfaces that lines could be laid through.
+    TooFewLines {
+        /// How many it has.
+        found: u16,
+        /// How many a match needs.
+        needed: u16,
+    },
+    /// Too few beams agree with the reference.
+    TooFewCorrespondences {
+        /// How many agree.
+        found: u16,
+        /// How many a match needs.
+        needed: u16,
+    },
+    /// The guess is not a number, or too far off to be one.
+    BadGuess,
+    /// No direction is determined well enough to say anything.
+    Degenerate,
+    /// The best pose explains the scan badly.
+    Unlikely {
+        /// Its score: see [`Match::score`].
+        score: f32,
+    },
+    /// The last step was still too long.
+    NotConverged {
+        /// Length of the last step (m).
+        step: f32,
+    },
+    /// Two different poses explain the scan about equally well.
+    Ambiguous {
+        /// Score of the second one over that of the first, 0…1.
+        ratio: f32,
+    },
+}
+
+impl fmt::Display for MatchError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooFewBeams { found, needed } => {
+                write!(f, "only {found} beams have a range, a match needs {needed}")
+            }
+            Self::TooFewLines { found, needed } => {
+                write!(
+                    f,
+                    "only {found} beams of the reference lie on a surface, a match needs {needed}"
+                )
+            }
+            Self::TooFewCorrespondences { found, needed } => {
+                write!(
+                    f,
+                    "only {found} beams agree with the reference, a match needs {needed}"
+                )
+            }
+            Self::BadGuess => f.write_str("the guess is not finite or farther than 32 m away"),
+            Self::Degenerate => f.write_str("the scene determines no direction well enough"),
+            Self::Unlikely { score } => {
+                write!(f, "the best pose explains the scan badly: score {score}")
+            }
+            Self::NotConverged { step } => write!(f, "not converged: the last step was {step} m"),
+            Self::Ambiguous { ratio } => {
+                write!(f, "ambiguous: another pose scores {ratio} of the best")
+            }
+        }
+    }
+}
+
+impl core::error::Error for MatchError {}

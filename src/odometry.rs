@@ -1,0 +1,343 @@
+//! Where the robot is by its scans: each matched against a keyframe, with wheel odometry or its own speed as the
+//! guess.
+
+use crate::{
+    geometry::{Pose, Twist},
+    linalg::{Covariance, Sym3},
+    matching::{
+        Match, MatchError,
+        icp::{self, IcpConfig, Reference},
+    },
+    math,
+    scan::{Mount, Points, PointsConfig, Scan},
+};
+
+/// Settings of [`Odometry`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OdometryConfig {
+    /// How the lidar sits on the robot. Default: at its centre, upright, looking forward.
+    pub mount: Mount,
+    /// Shortest range that is used (m). Default 0.05.
+    pub min_range: f32,
+    /// Longest range that is used (m). Default 32.
+    pub max_range: f32,
+    /// A new keyframe is made this far from the last one (m). Default 0.3: near enough for most surfaces to be seen by
+    /// both, far enough for errors not to add up often.
+    pub keyframe_distance: f32,
+    /// A new keyframe is made this much turned from the last one (rad). Default 0.35.
+    pub keyframe_turn: f32,
+    /// A new keyframe is made when fewer than this share of the beams meet the last one's surfaces. Default 0.6.
+    pub keyframe_overlap: f32,
+    /// A match that is farther than this from the guess is refused (m, and rad at twice its value). Default 0.4.
+    pub max_correction: f32,
+    /// Error of the guess, as a share of the distance and of the turn. Default 0.1.
+    pub prior_error: f32,
+    /// Scans refused one after the other before the keyframe is given up. Default 3.
+    pub max_refused: u8,
+    /// The matcher's settings. Default [`IcpConfig::DEFAULT`].
+    pub icp: IcpConfig,
+}
+
+impl OdometryConfig {
+    /// For a wheeled robot with a lidar of 5 to 15 turns a second.
+    pub const DEFAULT: Self = Self {
+        mount: Mount::DEFAULT,
+        min_range: 0.05,
+        max_range: 32.0,
+        keyframe_distance: 0.3,
+        keyframe_turn: 0.35,
+        keyframe_overlap: 0.6,
+        max_correction: 0.4,
+        prior_error: 0.1,
+        max_refused: 3,
+        icp: IcpConfig::DEFAULT,
+    };
+}
+
+impl Default for OdometryConfig {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// What [`Odometry::update`] made of a scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Step {
+    /// The robot at the scan's end, in the frame in which it started.
+    pub pose: Pose,
+    /// How far off `pose` may be by now.
+    pub covariance: Covariance,
+    /// The match against the keyframe, or why `pose` is only the guess.
+    pub outcome: Result<Match, Refusal>,
+    /// This scan is the new keyframe.
+    pub keyframe: bool,
+}
+
+/// Why a scan gave no pose of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Refusal {
+    /// The first scan: there was nothing to match against.
+    First,
+    /// The matcher found no pose.
+    NoMatch(MatchError),
+    /// The match is too far from the guess to be believed.
+    TooFar {
+        /// How far (m).
+        distance: f32,
+        /// How much turned (rad).
+        turn: f32,
+    },
+}
+
+impl core::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::First => f.write_str("the first scan has nothing to be matched against"),
+            Self::NoMatch(error) => error.fmt(f),
+            Self::TooFar { distance, turn } => {
+                write!(f, "the match is {distance} m and {turn} rad from the guess")
+            }
+        }
+    }
+}
+
+impl core::error::Error for Refusal {}
+
+/// What happened so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Counters {
+    /// Scans given.
+    pub scans: u32,
+    /// Scans whose pose is only the guess (the first does not count).
+    pub refused: u32,
+    /// Keyframes made.
+    pub keyframes: u32,
+    /// Keyframes given up because too many scans in a row were refused: the pose may have jumped.
+    pub lost: u32,
+}
+
+/// Pose from scans, in fixed memory.
+///
+/// 20·N + 300 bytes: a keyframe's lines and the current scan's points. N is the most beams of a turn.
+#[derive(Debug, Clone)]
+pub struct Odometry<const N: usize> {
+    config: OdometryConfig,
+    points: Points<N>,
+    keyframe: Reference<N>,
+    /// Robot at the keyframe.
+    keyframe_pose: Pose,
+    keyframe_covariance: Covariance,
+    pose: Pose,
+    covariance: Covariance,
+    /// Velocity by the last two poses.
+    twist: Twist,
+    wheels: Option<Pose>,
+    end_us: u32,
+    refused_in_a_row: u8,
+    counters: Counters,
+}
+
+impl<const N: usize> Odometry<N> {
+    /// At the origin, with nothing seen yet.
+    #[must_use]
+    pub const fn new(config: OdometryConfig) -> Self {
+        const EXACT: Covariance = Covariance(Sym3::diagonal(0.0, 0.0, 0.0));
+        Self {
+            config,
+            points: Points::new(),
+            keyframe: Reference::new(),
+            keyframe_pose: Pose::IDENTITY,
+            keyframe_covariance: EXACT,
+            pose: Pose::IDENTITY,
+            covariance: EXACT,
+            twist: Twist::ZERO,
+            wheels: None,
+            end_us: 0,
+            refused_in_a_row: 0,
+            counters: Counters {
+                scans: 0,
+                refused: 0,
+                keyframes: 0,
+                lost: 0,
+            },
+        }
+    }
+
+    /// The robot at the end of the last scan, in the frame in which it started.
+    #[must_use]
+    pub const fn pose(&self) -> Pose {
+        self.pose
+    }
+
+    /// The robot's velocity by the last two scans.
+    #[must_use]
+    pub const fn twist(&self) -> Twist {
+        self.twist
+    }
+
+    /// What happened so far.
+    #[must_use]
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// The last scan's points, in the lidar's frame.
+    #[must_use]
+    pub const fn points(&self) -> &Points<N> {
+        &self.points
+    }
+
+    /// Takes a scan in and says where the robot is.
+    ///
+    /// `wheels` is the robot's pose by its wheels at the scan's end, in any fixed frame; `None` means that the last
+    /// velocity goes on. A scan without a usable match leaves the guess as the pose, is counted, and says why.
+    pub fn update(&mut self, scan: &Scan<N>, wheels: Option<Pose>) -> Step {
+        let seconds = self.elapsed(scan);
+        let motion = self.predicted_motion(wheels, seconds);
+        let config = PointsConfig {
+            min_range: self.config.min_range,
+            max_range: self.config.max_range,
+            upside_down: self.config.mount.upside_down,
+        };
+        let during = Twist::from_motion(motion, seconds);
+        self.points
+            .assign(scan, self.config.mount.lidar_twist(during), &config);
+
+        let predicted = self.pose * motion;
+        let predicted_covariance = self.grown(motion);
+        let outcome = self.matched(predicted);
+        let before = self.pose;
+        match &outcome {
+            Ok(found) => {
+                (self.pose, self.covariance) = self.placed(found);
+                self.refused_in_a_row = 0;
+            }
+            Err(_) => {
+                (self.pose, self.covariance) = (predicted, predicted_covariance);
+            }
+        }
+        if seconds > 0.0 && self.counters.scans > 0 {
+            self.twist = Twist::from_motion(before.between(self.pose), seconds);
+        }
+        let keyframe = self.wants_keyframe(&outcome);
+        if keyframe {
+            self.keyframe.assign(self.points.as_slice());
+            self.keyframe_pose = self.pose;
+            self.keyframe_covariance = self.covariance;
+            self.counters.keyframes = self.counters.keyframes.wrapping_add(1);
+        }
+        self.counters.scans = self.counters.scans.wrapping_add(1);
+        self.wheels = wheels.filter(|pose| pose.is_finite());
+        self.end_us = scan.end_us();
+        Step {
+            pose: self.pose,
+            covariance: self.covariance,
+            outcome,
+            keyframe,
+        }
+    }
+
+    /// Time since the last scan's end (s); 0 for the first scan and for clocks that stand still or jump.
+    fn elapsed(&self, scan: &Scan<N>) -> f32 {
+        let micros = scan.end_us().wrapping_sub(self.end_us);
+        if self.counters.scans == 0 || micros > 2_000_000 {
+            return 0.0;
+        }
+        micros as f32 * 1e-6
+    }
+
+    /// Motion of the robot since the last scan by its wheels, else by going on as before.
+    fn predicted_motion(&self, wheels: Option<Pose>, seconds: f32) -> Pose {
+        match (self.wheels, wheels.filter(|pose| pose.is_finite())) {
+            (Some(before), Some(now)) => before.between(now),
+            _ => self.twist.over(seconds),
+        }
+    }
+
+    /// Covariance of the pose after a predicted motion.
+    fn grown(&self, motion: Pose) -> Covariance {
+        const LEAST: f32 = 0.002;
+        let along = self.config.prior_error * motion.distance() + LEAST;
+        let turn = self.config.prior_error * math::abs(motion.theta) + LEAST;
+        let moved = self.pose * motion;
+        self.covariance
+            .carried(moved.x - self.pose.x, moved.y - self.pose.y)
+            .plus(&Covariance(Sym3::diagonal(
+                along * along,
+                along * along,
+                turn * turn,
+            )))
+    }
+
+    /// Matches the points against the keyframe, starting from the predicted pose.
+    fn matched(&self, predicted: Pose) -> Result<Match, Refusal> {
+        if self.keyframe.is_empty() {
+            return Err(Refusal::First);
+        }
+        let guess = self
+            .config
+            .mount
+            .lidar_motion(self.keyframe_pose.between(predicted));
+        let found = icp::align(
+            &self.keyframe,
+            self.points.as_slice(),
+            guess,
+            &self.config.icp,
+        )
+        .map_err(Refusal::NoMatch)?;
+        let correction = guess.between(found.pose);
+        let (distance, turn) = (correction.distance(), math::abs(correction.theta));
+        if distance > self.config.max_correction || turn > 2.0 * self.config.max_correction {
+            return Err(Refusal::TooFar { distance, turn });
+        }
+        Ok(found)
+    }
+
+    /// Pose and covariance of the robot by a match.
+    fn placed(&self, found: &Match) -> (Pose, Covariance) {
+        let motion = self.config.mount.robot_motion(found.pose);
+        let pose = self.keyframe_pose * motion;
+        // The match is about the lidar: its error of heading moves the robot's centre about it.
+        let start_from_lidar = pose * self.config.mount.robot_from_lidar;
+        let lidar_frame = self.keyframe_pose * self.config.mount.robot_from_lidar;
+        let of_match = found
+            .covariance
+            .rotated(lidar_frame)
+            .carried(pose.x - start_from_lidar.x, pose.y - start_from_lidar.y);
+        let covariance = self
+            .keyframe_covariance
+            .carried(pose.x - self.keyframe_pose.x, pose.y - self.keyframe_pose.y)
+            .plus(&of_match);
+        (pose, covariance)
+    }
+
+    /// Whether the scan just placed is to be matched against from now on.
+    fn wants_keyframe(&mut self, outcome: &Result<Match, Refusal>) -> bool {
+        let enough = self.points.as_slice().len() >= 2 * usize::from(self.config.icp.min_inliers);
+        match outcome {
+            Err(Refusal::First) => enough,
+            Err(_) => {
+                self.counters.refused = self.counters.refused.wrapping_add(1);
+                self.refused_in_a_row = self.refused_in_a_row.saturating_add(1);
+                let given_up = self.refused_in_a_row >= self.config.max_refused && enough;
+                if given_up {
+                    self.refused_in_a_row = 0;
+                    self.counters.lost = self.counters.lost.wrapping_add(1);
+                }
+                given_up
+            }
+            Ok(found) => {
+                let moved = self.keyframe_pose.between(self.pose);
+                let met = f32::from(found.overlap) / f32::from(found.beams.max(1));
+                enough
+                    && (moved.distance() > self.config.keyframe_distance
+                        || math::abs(moved.theta) > self.config.keyframe_turn
+                        || met < self.config.keyframe_overlap)
+            }
+        }
+    }
+}
