@@ -2,5 +2,9 @@
 
 pub mod decode;
 pub mod encoder;
+pub mod hash;
+pub mod picture;
+pub mod pipeline;
 pub mod readers;
+pub mod recording;
 pub mod sim;

@@ -19,7 +19,7 @@ const TICK: f64 = 0.0005;
 /// How far the wheels tell the truth.
 #[derive(Debug, Clone, Copy)]
 pub struct WheelErrors {
-    /// Radius error of the left and the right wheel (share). Default +1.0 % and −0.6 %: tyres.
+    /// Radius error of the left and the right wheel (share). Default +0.3 % and −0.2 %: tyres.
     pub scale: [f64; 2],
     /// Random error per square root of metre (m). Default 4 mm.
     pub noise: f64,
@@ -30,7 +30,7 @@ pub struct WheelErrors {
 impl WheelErrors {
     /// An ordinary small robot on a smooth floor.
     pub const DEFAULT: Self = Self {
-        scale: [0.010, -0.006],
+        scale: [0.003, -0.002],
         noise: 0.004,
         slips_per_s: 0.1,
     };
