@@ -2,6 +2,7 @@
 
 mod decode;
 mod output;
+mod replay;
 mod simulate;
 
 use std::process::ExitCode;
@@ -24,11 +25,10 @@ struct Tool {
 #[derive(Subcommand)]
 enum Command {
     Simulate(simulate::Args),
+    Replay(replay::Args),
     Decode(decode::Args),
 }
 
-/// Exit status of a run that found a difference, as opposed to one that could not do its work.
-pub const DIFFERENT: u8 = 1;
 /// Exit status of a run that could not do its work: a bad file, a bad setting.
 const FAILED: u8 = 2;
 
@@ -37,6 +37,7 @@ pub fn run() -> ExitCode {
     let tool = Tool::parse();
     let done: Result<ExitCode> = match tool.command {
         Some(Command::Decode(args)) => decode::run(&args),
+        Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Simulate(args)) => simulate::run(&args),
         None => simulate::run(&tool.simulate),
     };

@@ -1,7 +1,7 @@
 //! The firmware's pipeline on the host: beams in, poses out, with the counts and the hash that a report needs.
 
 use beamfix::geometry::{Point, Pose, Twist};
-use beamfix::odometry::{Odometry, OdometryConfig, Step};
+use beamfix::odometry::{Counters, Odometry, OdometryConfig, Step};
 use beamfix::scan::{Beam, Scan};
 
 use crate::hash::PoseHash;
@@ -10,12 +10,6 @@ use crate::hash::PoseHash;
 pub struct Pipeline<const N: usize> {
     odometry: Odometry<N>,
     scan: Scan<N>,
-    /// Scans so far.
-    pub scans: usize,
-    /// Scans whose match was refused.
-    pub refused: usize,
-    /// Scans that became keyframes.
-    pub keyframes: usize,
     /// Beams that found no room because a scan had more than N.
     pub refused_beams: usize,
     /// Over all poses so far.
@@ -29,12 +23,15 @@ impl<const N: usize> Pipeline<N> {
         Box::new(Self {
             odometry: Odometry::new(config),
             scan: Scan::new(),
-            scans: 0,
-            refused: 0,
-            keyframes: 0,
             refused_beams: 0,
             hash: PoseHash::new(),
         })
+    }
+
+    /// What happened so far.
+    #[must_use]
+    pub fn counters(&self) -> Counters {
+        self.odometry.counters()
     }
 
     /// Takes the next scan; `wheels` is the robot's pose by wheel odometry at its end.
@@ -44,9 +41,6 @@ impl<const N: usize> Pipeline<N> {
             self.refused_beams += usize::from(self.scan.push(beam).is_err());
         }
         let step = self.odometry.update(&self.scan, wheels);
-        self.scans += 1;
-        self.refused += usize::from(step.outcome.is_err());
-        self.keyframes += usize::from(step.keyframe);
         self.hash.push(step.pose);
         step
     }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use beamfix::geometry::{Point, Pose};
-use beamfix::odometry::OdometryConfig;
+use beamfix::odometry::{Counters, OdometryConfig};
 use beamfix::scan::Mount;
 use host_tests::picture::{self, colour, map};
 use host_tests::pipeline::{Pipeline, places};
@@ -164,13 +164,19 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     picture::save(&picture, &args.out.join("map.png"))?;
 
+    let Counters {
+        scans,
+        refused,
+        keyframes,
+        lost,
+    } = pipeline.counters();
     let value = json!({
         "lidar": args.lidar, "seed": args.seed,
         "final_error_m": errors.last.0, "final_error_deg": errors.last.1,
         "max_error_m": errors.largest.0, "max_error_deg": errors.largest.1,
         "wheels_error_m": errors.wheels.0, "wheels_error_deg": errors.wheels.1,
-        "distance_m": drive.distance, "seconds": seconds, "scans": pipeline.scans,
-        "refused": pipeline.refused, "keyframes": pipeline.keyframes, "refused_beams": pipeline.refused_beams,
+        "distance_m": drive.distance, "seconds": seconds, "scans": scans,
+        "refused": refused, "keyframes": keyframes, "lost": lost, "refused_beams": pipeline.refused_beams,
         "bytes": drive.bytes.len(), "packets": summary.packets, "pose_hash": pipeline.hash.to_string(),
     });
     let text = format!(
@@ -180,9 +186,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         errors.wheels.1,
         drive.bytes.len(),
         summary.packets,
-        pipeline.scans,
-        pipeline.refused,
-        pipeline.keyframes,
+        scans,
+        refused,
+        keyframes,
         pipeline.hash,
         args.out.display()
     );
