@@ -1,5 +1,6 @@
 //! Host side of beamfix: simulator, readers, pictures.
 
+pub mod board;
 pub mod decode;
 pub mod encoder;
 pub mod hash;

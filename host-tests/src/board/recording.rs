@@ -1,6 +1,6 @@
 //! What reaches a board, as the bytes of its command line.
 
-use beamfix::{geometry::Pose, scan::Scan};
+use beamfix::{geometry::Pose, scan::Beam};
 use beamfix_app::{
     command::{self, Command},
     link,
@@ -39,25 +39,18 @@ impl Recording {
     }
 
     /// A whole scan. It is matched when the next one starts, or at [`Recording::end`].
-    pub fn scan<const N: usize>(&mut self, scan: &Scan<N>) {
-        let beams: Vec<command::WireBeam> = scan.beams().map(Into::into).collect();
+    pub fn scan(&mut self, beams: &[Beam]) {
         for (k, piece) in beams.chunks(command::BEAMS).enumerate() {
             self.push(&Command::Beams {
                 turn_starts: k == 0,
-                beams: piece.iter().copied().collect(),
+                beams: piece.iter().map(|&beam| beam.into()).collect(),
             });
         }
     }
 
-    /// Completes the last scan.
-    pub fn end<const N: usize>(&mut self, last: &Scan<N>) {
-        let Some(beam) = last.beams().last() else {
-            return;
-        };
-        self.push(&Command::Beams {
-            turn_starts: true,
-            beams: std::iter::once(beam.into()).collect(),
-        });
+    /// Completes the last scan: as if another began with the beam `next`.
+    pub fn end(&mut self, next: Beam) {
+        self.scan(&[next]);
     }
 
     fn push(&mut self, command: &Command) {

@@ -113,6 +113,32 @@ impl Stream {
     }
 }
 
+/// Streams lidar bytes through a board's UART and compares every message with what the application sends here.
+///
+/// Gives the number of poses; an error names the first message that differs.
+pub fn compare(board: &Board, bytes: &[u8]) -> Result<usize> {
+    let mut app = Box::new(super::new_app());
+    let mut stream = Stream::open(board)?;
+    let mut here = Receiver::new();
+    let mut poses = 0;
+    for piece in bytes.chunks(1024) {
+        stream.send(piece)?;
+        for &byte in piece {
+            for &sent in app.lidar(byte) {
+                let Some(expected) = here.push::<Telemetry>(sent) else {
+                    continue;
+                };
+                let got = stream.receive()?;
+                if format!("{got:?}") != format!("{expected:?}") {
+                    bail!("{}: pose {poses}: {got:?}, here {expected:?}", board.name);
+                }
+                poses += usize::from(matches!(expected, Telemetry::Pose(_)));
+            }
+        }
+    }
+    Ok(poses)
+}
+
 fn accept(listener: &UnixListener) -> Result<UnixStream> {
     listener.set_nonblocking(true)?;
     let end = Instant::now() + TIMEOUT;
