@@ -48,16 +48,38 @@ enum Line {
 }
 
 /// All there are.
-pub const BOARDS: &[Board] = &[Board {
-    name: "m4f",
-    core: "Cortex-M4F",
-    package: "qemu-m4f",
-    target: "thumbv7em-none-eabihf",
-    emulator: "qemu-system-arm",
-    machine: &["-M", "mps2-an386"],
-    icount_shift: 6,
-    uarts: &[Line::Lidar, Line::Telemetry, Line::Commands],
-}];
+pub const BOARDS: &[Board] = &[
+    Board {
+        name: "m4f",
+        core: "Cortex-M4F",
+        package: "qemu-m4f",
+        target: "thumbv7em-none-eabihf",
+        emulator: "qemu-system-arm",
+        machine: &["-M", "mps2-an386"],
+        icount_shift: 6,
+        uarts: &[Line::Lidar, Line::Telemetry, Line::Commands],
+    },
+    Board {
+        name: "m0",
+        core: "Cortex-M0",
+        package: "qemu-m0",
+        target: "thumbv6m-none-eabi",
+        emulator: "qemu-system-arm",
+        machine: &["-M", "microbit"],
+        icount_shift: 6,
+        uarts: &[Line::LidarAndTelemetry],
+    },
+    Board {
+        name: "rv32",
+        core: "RV32IMC",
+        package: "qemu-rv32",
+        target: "riscv32imc-unknown-none-elf",
+        emulator: "qemu-system-riscv32",
+        machine: &["-M", "virt", "-bios", "none"],
+        icount_shift: 0,
+        uarts: &[Line::LidarAndTelemetry],
+    },
+];
 
 impl Board {
     /// The board of this name.

@@ -9,26 +9,35 @@ pub struct Stack {
 }
 
 impl Stack {
-    /// Paints the memory from `bottom` to just below the frame of the caller. `top` is where the stack begins.
-    ///
-    /// # Safety
-    /// Nothing else may use the memory between `bottom` and the stack pointer, and both must be aligned to 4.
+    /// Paints what is not used yet. Once, at the start.
     #[inline(never)]
-    pub unsafe fn paint(bottom: *mut u32, top: *mut u32) -> Self {
+    pub fn paint() -> Self {
+        // cortex-m-rt and riscv-rt name them alike: the end of the statics, and where the stack begins. Nothing uses
+        // a heap.
+        unsafe extern "C" {
+            static mut __sheap: u32;
+            static mut _stack_start: u32;
+        }
+        let bottom = &raw mut __sheap;
         let here = 0u32;
-        // Room for this function's own frame and what it calls.
+        // Room for this function's own frame.
         let end = (&raw const here).cast_mut().wrapping_sub(32);
         let mut word = bottom;
         while word < end {
+            // SAFETY: between the statics and the stack nothing lives.
             unsafe { word.write_volatile(PAINT) };
             word = word.wrapping_add(1);
         }
-        Self { bottom, top }
+        Self {
+            bottom,
+            top: &raw mut _stack_start,
+        }
     }
 
     /// Deepest stack since the painting (bytes).
     pub fn peak(&self) -> u32 {
         let mut word = self.bottom;
+        // SAFETY: this memory is only ever written by the stack.
         while word < self.top && unsafe { word.read_volatile() } == PAINT {
             word = word.wrapping_add(1);
         }

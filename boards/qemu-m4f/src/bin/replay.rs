@@ -4,11 +4,11 @@
 
 use beamfix::odometry::OdometryConfig;
 use beamfix_app::App;
-use beamfix_emulated::{finish, replay};
-use qemu_m4f::{clock::Timer, stack};
+use beamfix_emulated::{finish, replay, stack::Stack};
+use qemu_m4f::clock::Timer;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
     static mut APP: App<480> = App::new(OdometryConfig::DEFAULT);
-    finish(replay::run(APP, &mut Timer, &stack()))
+    finish(replay::run(APP, &mut Timer, &Stack::paint()))
 }
