@@ -11,6 +11,7 @@
 
 pub mod command;
 pub mod link;
+pub mod pairs;
 pub mod telemetry;
 
 use beamfix::{

@@ -4,6 +4,7 @@
 //! a [`Machine`] is what they differ in.
 #![no_std]
 
+pub mod bench;
 mod panic;
 pub mod replay;
 pub mod stack;
