@@ -14,11 +14,6 @@ use beamfix_app::telemetry::{Cost, Telemetry};
 
 use recording::Recording;
 
-/// Most beams a revolution may have on every board.
-pub const BEAMS: usize = 480;
-/// The application as the boards run it.
-pub type App = beamfix_app::App<BEAMS>;
-
 /// An emulated board.
 #[derive(Debug)]
 pub struct Board {
@@ -84,10 +79,13 @@ pub const BOARDS: &[Board] = &[
 impl Board {
     /// The board of this name.
     pub fn named(name: &str) -> Result<&'static Self> {
-        BOARDS.iter().find(|board| board.name == name).with_context(|| {
-            let names: Vec<_> = BOARDS.iter().map(|board| board.name).collect();
-            format!("no board {name:?}: there are {}", names.join(", "))
-        })
+        BOARDS
+            .iter()
+            .find(|board| board.name == name)
+            .with_context(|| {
+                let names: Vec<_> = BOARDS.iter().map(|board| board.name).collect();
+                format!("no board {name:?}: there are {}", names.join(", "))
+            })
     }
 
     /// Builds one of the board's programs (`""`: the firmware itself); gives the ELF file.
@@ -220,8 +218,8 @@ fn bits(pose: &beamfix_app::telemetry::Pose) -> impl PartialEq + use<> {
     )
 }
 
-fn new_app() -> App {
-    App::new(beamfix::odometry::OdometryConfig::DEFAULT)
+fn new_app() -> beamfix_app::Board {
+    beamfix_app::Board::new(beamfix_app::CONFIG)
 }
 
 fn root() -> &'static Path {

@@ -33,8 +33,15 @@ fn every_board_replays_the_same_bits() {
     let here = Replay::on_host(&recording);
     assert!(here.poses().count() >= 27, "{}", here.poses().count());
     for board in BOARDS {
-        let there = board.replay(&recording).unwrap_or_else(|error| panic!("{error:#}"));
-        assert_eq!(difference(here.poses(), there.poses()), None, "{}", board.name);
+        let there = board
+            .replay(&recording)
+            .unwrap_or_else(|error| panic!("{error:#}"));
+        assert_eq!(
+            difference(here.poses(), there.poses()),
+            None,
+            "{}",
+            board.name
+        );
         println!("{}: {:?}", board.name, there.costs.last());
     }
 }

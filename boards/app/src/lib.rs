@@ -18,7 +18,7 @@ use beamfix::{
     geometry::Pose,
     lidar::{Packet as _, Protocol as _, ld06},
     matching::MatchError,
-    odometry::{Odometry, OdometryConfig, Step},
+    odometry::{Odometry, OdometryConfig, Refusal, Step},
     scan::{Assembler, Beam},
 };
 use heapless::Vec;
@@ -31,7 +31,15 @@ pub const VERSION: u8 = 1;
 /// Revolutions between two health messages.
 const HEALTH_EVERY: u16 = 16;
 
-/// What a board runs. N is the most beams a revolution may have: 480 for an LD06 at 10 Hz.
+/// Most beams of a revolution: an LD06 sends 450 at 10 Hz. Further ones are refused and counted.
+pub const BEAMS: usize = 456;
+/// How the lidar sits on the robot, what is believed and what is not: change it here for all boards.
+pub const CONFIG: OdometryConfig = OdometryConfig::DEFAULT;
+
+/// The application as the boards run it.
+pub type Board = App<BEAMS>;
+
+/// What a board runs. N is the most beams a revolution may have.
 pub struct App<const N: usize> {
     lidar: ld06::Parser,
     commands: link::Receiver,
@@ -45,7 +53,6 @@ struct Turns<const N: usize> {
     /// Where the robot is by its wheels, until a revolution has used it.
     wheels: Option<Pose>,
     sequence: u16,
-    matches_refused: u32,
     bytes_lost: u32,
     health_due: bool,
     out: Vec<u8, 192>,
@@ -63,7 +70,6 @@ impl<const N: usize> App<N> {
                 odometry: Odometry::new(config),
                 wheels: None,
                 sequence: 0,
-                matches_refused: 0,
                 health_due: false,
                 bytes_lost: 0,
                 out: Vec::new(),
@@ -137,7 +143,7 @@ impl<const N: usize> App<N> {
             check_errors: lidar.check_errors,
             skipped_bytes: lidar.skipped_bytes,
             beams_refused: self.turns.assembler.refused_beams(),
-            matches_refused: self.turns.matches_refused,
+            matches_refused: self.turns.odometry.counters().refused,
             commands: commands.frames,
             command_errors: commands.errors,
             bytes_lost: self.turns.bytes_lost,
@@ -160,11 +166,15 @@ impl<const N: usize> Turns<N> {
             return;
         }
         let scan = self.assembler.scan();
+        let time_us = scan.end_us();
         let step = self.odometry.update(scan, self.wheels.take());
-        let pose = frame(self.sequence, scan.end_us(), &step);
-        if step.outcome.is_err() {
-            self.matches_refused = self.matches_refused.wrapping_add(1);
-        }
+        self.report(time_us, &step);
+    }
+
+    /// Apart, so that its memory is not on the stack during the match.
+    #[inline(never)]
+    fn report(&mut self, time_us: u32, step: &Step) {
+        let pose = frame(self.sequence, time_us, step);
         self.sequence = self.sequence.wrapping_add(1);
         self.health_due |= self.sequence.is_multiple_of(HEALTH_EVERY);
         self.send(&Telemetry::Pose(pose));
@@ -180,9 +190,19 @@ impl<const N: usize> Turns<N> {
 fn frame(sequence: u16, time_us: u32, step: &Step) -> telemetry::Pose {
     let c = step.covariance.0;
     let (verdict, inliers, beams, residual) = match &step.outcome {
-        Ok(found) if step.keyframe => (Verdict::Keyframe, found.inliers, found.beams, found.residual),
-        Ok(found) => (Verdict::Measured, found.inliers, found.beams, found.residual),
-        Err(error) => (verdict(error), 0, 0, 0.0),
+        Ok(found) if step.keyframe => (
+            Verdict::Keyframe,
+            found.inliers,
+            found.beams,
+            found.residual,
+        ),
+        Ok(found) => (
+            Verdict::Measured,
+            found.inliers,
+            found.beams,
+            found.residual,
+        ),
+        Err(refusal) => (verdict(refusal), 0, 0, 0.0),
     };
     telemetry::Pose {
         sequence,
@@ -196,12 +216,18 @@ fn frame(sequence: u16, time_us: u32, step: &Step) -> telemetry::Pose {
     }
 }
 
-fn verdict(error: &MatchError) -> Verdict {
-    match error {
-        MatchError::TooFewBeams { .. } => Verdict::TooFewBeams,
-        MatchError::TooFewCorrespondences { .. } => Verdict::TooFewCorrespondences,
-        MatchError::Degenerate => Verdict::Degenerate,
-        MatchError::NotConverged { .. } => Verdict::NotConverged,
+fn verdict(refusal: &Refusal) -> Verdict {
+    match refusal {
+        Refusal::First => Verdict::First,
+        Refusal::TooFar { .. } => Verdict::TooFar,
+        Refusal::NoMatch(MatchError::TooFewBeams { .. }) => Verdict::TooFewBeams,
+        Refusal::NoMatch(MatchError::TooFewLines { .. }) => Verdict::TooFewLines,
+        Refusal::NoMatch(MatchError::TooFewCorrespondences { .. }) => {
+            Verdict::TooFewCorrespondences
+        }
+        Refusal::NoMatch(MatchError::Degenerate) => Verdict::Degenerate,
+        Refusal::NoMatch(MatchError::NotConverged { .. }) => Verdict::NotConverged,
+        Refusal::NoMatch(MatchError::Ambiguous { .. }) => Verdict::Ambiguous,
         _ => Verdict::Refused,
     }
 }

@@ -3,38 +3,98 @@
 //! A zero byte never occurs inside a frame, so a reader that joins late or has lost bytes is right again
 //! after the next one.
 
-use cobs::{CobsEncoder, DecodeResult, DecoderState};
-use crc::{CRC_16_IBM_3740, Crc, NoTable};
+use cobs::{DecodeResult, DecoderState, EncoderState, PushResult};
+use crc::{CRC_16_IBM_3740, Crc, Digest, NoTable};
 use heapless::Vec;
+use postcard::ser_flavors::Flavor;
 use serde::{Deserialize, Serialize};
 
 /// Most bytes of a message before framing.
 pub const MESSAGE: usize = 200;
-/// Most bytes of a frame: COBS adds one and the end another.
-pub const FRAME: usize = MESSAGE + 2;
+/// Most bytes of a frame: the check code adds two, COBS one, the end one.
+pub const FRAME: usize = MESSAGE + 4;
 
-/// No table: half a kilobyte of flash is worth more here than 60 bytes' worth of speed.
-const CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_IBM_3740);
+/// No table: half a kilobyte of flash is worth more here than speed.
+static CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_IBM_3740);
 
 /// Appends `message` as a frame; `false`, with `out` as it was, where there is no room for it.
 #[must_use]
 pub fn append<const N: usize>(message: &impl Serialize, out: &mut Vec<u8, N>) -> bool {
-    let mut plain = [0; MESSAGE];
-    let Ok(used) = postcard::to_slice(message, &mut plain) else {
-        return false;
+    let start = out.len();
+    let framing = Framing {
+        start,
+        state: EncoderState::default(),
+        digest: CRC.digest(),
+        out,
     };
-    let check = CRC.checksum(used).to_le_bytes();
-    let mut frame = [0; FRAME];
-    let mut encoder = CobsEncoder::new(&mut frame);
-    if encoder.push(used).is_err() || encoder.push(&check).is_err() {
-        return false;
+    let written = framing
+        .begin()
+        .and_then(|framing| postcard::serialize_with_flavor(message, framing));
+    if written.is_err() {
+        out.truncate(start);
     }
-    let length = encoder.finalize();
-    // The byte after the last is still the zero that ends the frame.
-    match frame.get(..length + 1) {
-        Some(frame) => out.extend_from_slice(frame).is_ok(),
-        None => false,
+    written.is_ok()
+}
+
+/// Frames a message while postcard writes it: no buffer but the one it goes to.
+struct Framing<'a, const N: usize> {
+    out: &'a mut Vec<u8, N>,
+    /// Where the frame starts.
+    start: usize,
+    state: EncoderState,
+    digest: Digest<'static, u16, NoTable>,
+}
+
+impl<const N: usize> Framing<'_, N> {
+    /// Makes room for the first of COBS's distances.
+    fn begin(self) -> postcard::Result<Self> {
+        append_byte(self.out, 0)?;
+        Ok(self)
     }
+
+    fn encode(&mut self, byte: u8) -> postcard::Result<()> {
+        match self.state.push(byte) {
+            PushResult::AddSingle(byte) => append_byte(self.out, byte),
+            PushResult::ModifyFromStartAndSkip((at, distance)) => {
+                self.set(at, distance)?;
+                append_byte(self.out, 0)
+            }
+            PushResult::ModifyFromStartAndPushAndSkip((at, distance, byte)) => {
+                self.set(at, distance)?;
+                append_byte(self.out, byte)?;
+                append_byte(self.out, 0)
+            }
+        }
+    }
+
+    fn set(&mut self, at: usize, distance: u8) -> postcard::Result<()> {
+        let slot = self.out.get_mut(self.start + at);
+        *slot.ok_or(postcard::Error::SerializeBufferFull)? = distance;
+        Ok(())
+    }
+}
+
+impl<const N: usize> Flavor for Framing<'_, N> {
+    type Output = ();
+
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        self.digest.update(&[byte]);
+        self.encode(byte)
+    }
+
+    fn finalize(mut self) -> postcard::Result<()> {
+        for byte in self.digest.clone().finalize().to_le_bytes() {
+            self.encode(byte)?;
+        }
+        let (at, distance) = self.state.clone().finalize();
+        self.set(at, distance)?;
+        append_byte(self.out, 0)
+    }
+}
+
+fn append_byte<const N: usize>(out: &mut Vec<u8, N>, byte: u8) -> postcard::Result<()> {
+    out.push(byte)
+        .map_err(|_| postcard::Error::SerializeBufferFull)
 }
 
 /// Takes frames apart, byte by byte.

@@ -27,13 +27,15 @@ impl<const N: usize> Pairs<N> {
 
     /// Preparation, first half: the scan to be matched against, from its beams.
     pub fn set_reference(&mut self, scan: &Scan<N>) {
-        self.points.assign(scan, Twist::ZERO, &PointsConfig::DEFAULT);
+        self.points
+            .assign(scan, Twist::ZERO, &PointsConfig::DEFAULT);
         self.reference.assign(self.points.as_slice());
     }
 
     /// Preparation, second half: the scan to be matched.
     pub fn set_current(&mut self, scan: &Scan<N>) {
-        self.points.assign(scan, Twist::ZERO, &PointsConfig::DEFAULT);
+        self.points
+            .assign(scan, Twist::ZERO, &PointsConfig::DEFAULT);
     }
 
     /// The match itself.

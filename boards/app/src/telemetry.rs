@@ -48,22 +48,30 @@ pub struct Pose {
     pub residual: f32,
 }
 
-/// What became of a match.
+/// What became of a match. All but the first two mean that the pose is only predicted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Verdict {
     /// The pose is measured.
     Measured,
     /// Measured, and this revolution is now what later ones are compared with.
     Keyframe,
-    /// Predicted: the revolution had too few beams.
+    /// The first revolution: nothing to match against.
+    First,
+    /// The revolution has too few beams with a range.
     TooFewBeams,
-    /// Predicted: too few beams found a correspondence.
+    /// What it was matched against has too few surfaces.
+    TooFewLines,
+    /// Too few beams found a correspondence.
     TooFewCorrespondences,
-    /// Predicted: the geometry leaves a direction undetermined.
+    /// The geometry leaves the pose undetermined.
     Degenerate,
-    /// Predicted: the iteration limit came first.
+    /// The iteration limit came first.
     NotConverged,
-    /// Predicted, for a reason that this version does not name.
+    /// Two poses explain the revolution equally well.
+    Ambiguous,
+    /// The match is too far from the prediction to be believed.
+    TooFar,
+    /// For a reason that this version does not name.
     Refused,
 }
 

@@ -85,7 +85,10 @@ impl<const N: usize> Bench<N> {
 
 fn pose_from(bytes: &[u8; 12]) -> Pose {
     let [x, y, theta] = core::array::from_fn(|k| {
-        let word = bytes.chunks_exact(4).nth(k).and_then(|word| word.try_into().ok());
+        let word = bytes
+            .chunks_exact(4)
+            .nth(k)
+            .and_then(|word| word.try_into().ok());
         f32::from_le_bytes(word.unwrap_or_default())
     });
     Pose { x, y, theta }

@@ -1,8 +1,7 @@
 //! The application over a recording: commands in, frames out, the cost of every revolution behind its pose.
 
 use beamfix_app::{
-    App,
-    link::{self, FRAME},
+    App, link,
     telemetry::{Cost, Telemetry},
 };
 use heapless::Vec;
@@ -23,7 +22,7 @@ pub fn run<const N: usize>(
     let mut input = File::open(INPUT)?;
     let mut output = File::create(OUTPUT)?;
     output.write_all(app.ready())?;
-    let mut chunk = [0; 256];
+    let mut chunk = [0; 64];
     loop {
         let n = input.read(&mut chunk)?;
         let Some(bytes) = chunk.get(..n).filter(|bytes| !bytes.is_empty()) else {
@@ -35,15 +34,22 @@ pub fn run<const N: usize>(
             let instructions = machine.instructions();
             if !frames.is_empty() {
                 output.write_all(frames)?;
-                let cost = Cost {
-                    instructions,
-                    stack_bytes: stack.peak(),
-                };
-                let mut frame = Vec::<u8, FRAME>::new();
-                if link::append(&Telemetry::Cost(cost), &mut frame) {
-                    output.write_all(&frame)?;
-                }
+                write_cost(&mut output, instructions, stack.peak())?;
             }
         }
     }
+}
+
+/// Apart, so that its memory is not on the stack during a match.
+#[inline(never)]
+fn write_cost(output: &mut File, instructions: u32, stack_bytes: u32) -> io::Result<()> {
+    let cost = Cost {
+        instructions,
+        stack_bytes,
+    };
+    let mut frame = Vec::<u8, 24>::new();
+    if link::append(&Telemetry::Cost(cost), &mut frame) {
+        output.write_all(&frame)?;
+    }
+    Ok(())
 }

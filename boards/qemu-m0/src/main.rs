@@ -2,13 +2,12 @@
 #![no_std]
 #![no_main]
 
-use beamfix::odometry::OdometryConfig;
-use beamfix_app::App;
+use beamfix_app::{Board, CONFIG};
 use qemu_m0::uart;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static mut APP: App<480> = App::new(OdometryConfig::DEFAULT);
+    static mut APP: Board = Board::new(CONFIG);
 
     uart::enable();
     uart::send(APP.ready());

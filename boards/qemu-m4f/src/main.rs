@@ -2,8 +2,7 @@
 #![no_std]
 #![no_main]
 
-use beamfix::odometry::OdometryConfig;
-use beamfix_app::App;
+use beamfix_app::{Board, CONFIG};
 use cortex_m::interrupt;
 use cortex_m_rt::{entry, exception};
 use qemu_m4f::{ring::Ring, uart::Uart};
@@ -13,7 +12,7 @@ static COMMANDS: Ring = Ring::new();
 
 #[entry]
 fn main() -> ! {
-    static mut APP: App<480> = App::new(OdometryConfig::DEFAULT);
+    static mut APP: Board = Board::new(CONFIG);
 
     Uart::TELEMETRY.enable();
     Uart::LIDAR.enable();

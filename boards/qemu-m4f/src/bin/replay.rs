@@ -2,13 +2,12 @@
 #![no_std]
 #![no_main]
 
-use beamfix::odometry::OdometryConfig;
-use beamfix_app::App;
+use beamfix_app::{Board, CONFIG};
 use beamfix_emulated::{finish, replay, stack::Stack};
 use qemu_m4f::clock::Timer;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static mut APP: App<480> = App::new(OdometryConfig::DEFAULT);
+    static mut APP: Board = Board::new(CONFIG);
     finish(replay::run(APP, &mut Timer, &Stack::paint()))
 }

@@ -8,7 +8,8 @@ use qemu_rv32::clock::Timer;
 #[riscv_rt::entry]
 fn main() -> ! {
     static mut BENCH: Bench<360> = Bench::new();
+    let bench = &raw mut BENCH;
     // SAFETY: only the start-up code calls `main`, once.
-    let bench = unsafe { &mut *(&raw mut BENCH) };
+    let bench = unsafe { &mut *bench };
     finish(bench.run(&mut Timer::default(), &Stack::paint()))
 }

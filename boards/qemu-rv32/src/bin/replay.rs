@@ -2,15 +2,15 @@
 #![no_std]
 #![no_main]
 
-use beamfix::odometry::OdometryConfig;
-use beamfix_app::App;
+use beamfix_app::{Board, CONFIG};
 use beamfix_emulated::{finish, replay, stack::Stack};
 use qemu_rv32::clock::Timer;
 
 #[riscv_rt::entry]
 fn main() -> ! {
-    static mut APP: App<480> = App::new(OdometryConfig::DEFAULT);
+    static mut APP: Board = Board::new(CONFIG);
+    let app = &raw mut APP;
     // SAFETY: only the start-up code calls `main`, once.
-    let app = unsafe { &mut *(&raw mut APP) };
+    let app = unsafe { &mut *app };
     finish(replay::run(app, &mut Timer::default(), &Stack::paint()))
 }
