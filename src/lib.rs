@@ -14,9 +14,11 @@
 #![forbid(unsafe_code)]
 
 pub mod geometry;
+pub mod grid;
 pub mod lidar;
 pub mod linalg;
 pub mod matching;
 pub mod math;
 pub mod odometry;
 pub mod scan;
+pub mod sensor_model;

@@ -1,0 +1,440 @@
+//! Scan to likelihood field by Newton's method on the log-likelihood.
+//!
+//! Near a surface the logarithm of the likelihood is a parabola across it, so each beam's cell and its neighbours
+//! give the exact slope and curvature wherever in the cell the beam ends. (Bilinear interpolation would give the
+//! slope at the middle between two cells, and pull straight walls to the middles of cells.)
+
+use super::{Match, MatchError, WeakDirection};
+use crate::{
+    geometry::{Point, Pose},
+    grid::Shape,
+    linalg::{Covariance, Information, Sym3},
+    math,
+    scan::points::ScanPoint,
+    sensor_model::likelihood_field::{Field, placement::Placement},
+};
+
+/// When to stop, and what to believe.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldConfig {
+    /// Most passes over the beams. Default 20.
+    pub max_iterations: u8,
+    /// A step shorter than this ends the search (m). Default 0.0002.
+    pub translation_tolerance: f32,
+    /// And turning less than this (rad). Default 0.0001.
+    pub rotation_tolerance: f32,
+    /// While far off, every so-many-th beam is enough. Default 4.
+    pub coarse_stride: u8,
+    /// In the end only beams so near to a surface count (m). Default 0.05: five times a range's noise. What
+    /// one scan sees and the other does not would pull.
+    pub inlier_distance: f32,
+    /// Fewest beams that must end near a surface. Default 20.
+    pub min_inliers: u16,
+    /// And their least share of all beams. Default 0.3.
+    pub min_share: f32,
+    /// Least noise to assume (m): what the field's cells leave. Default 0.01.
+    pub sigma: f32,
+    /// A direction is weak whose curvature is below this share of that of a wall facing all beams. Default 0.01.
+    pub weak_share: f32,
+}
+
+impl FieldConfig {
+    /// For cells of 5 cm and lidars with 1 cm of noise.
+    pub const DEFAULT: Self = Self {
+        max_iterations: 20,
+        translation_tolerance: 0.0002,
+        rotation_tolerance: 0.0001,
+        coarse_stride: 4,
+        inlier_distance: 0.05,
+        min_inliers: 20,
+        min_share: 0.3,
+        sigma: 0.01,
+        weak_share: 0.01,
+    };
+}
+
+impl Default for FieldConfig {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// Pose from which `points` fit `field` best, near `guess`.
+///
+/// From 2.5σ and a few degrees off: start from a search or a coarser field otherwise.
+/// A direction that the scene hardly determines keeps the guess and is named in [`Match::weak`].
+pub fn align<F: Field + ?Sized>(
+    field: &F,
+    points: &[ScanPoint],
+    guess: Pose,
+    config: &FieldConfig,
+) -> Result<Match, MatchError> {
+    let found = points.len() as u16;
+    if found < config.min_inliers {
+        return Err(MatchError::TooFewBeams {
+            found,
+            needed: config.min_inliers,
+        });
+    }
+    let mut pose = guess;
+    let mut stride = config.coarse_stride.max(1);
+    let mut iterations = 0;
+    let gates = (
+        gate(field, 2.5 * field.scale().sigma),
+        gate(field, config.inlier_distance),
+    );
+    let mut fine_passes = 0;
+    let sums = loop {
+        let gate = if stride > 1 { gates.0 } else { gates.1 };
+        let sums = Sums::over(field, points, pose, usize::from(stride), gate)
+            .ok_or(MatchError::BadGuess)?;
+        iterations += 1;
+        let needed = sums.needed(config, points.len());
+        if sums.inliers < needed {
+            return Err(MatchError::TooFewCorrespondences {
+                found: sums.inliers,
+                needed,
+            });
+        }
+        let step = sums.step(config).ok_or(MatchError::Degenerate)?;
+        pose = sums.moved(field.shape(), pose, step);
+        let length = field.shape().resolution() * math::sqrt(step[0] * step[0] + step[1] * step[1]);
+        let small = |factor: f32| {
+            length <= factor * config.translation_tolerance
+                && math::abs(step[2]) <= factor * config.rotation_tolerance
+        };
+        if stride > 1 {
+            // A quarter of the beams leave the pose twice as uncertain as all: no use in more digits.
+            if small(10.0) || iterations >= config.max_iterations / 2 {
+                stride = 1;
+            }
+            continue;
+        }
+        // Bytes are steps: two poses a fraction of a millimetre apart may hand the search back and forth.
+        fine_passes += 1;
+        if small(1.0) || (fine_passes > 5 && small(10.0)) {
+            break sums;
+        } else if iterations >= config.max_iterations {
+            return Err(MatchError::NotConverged { step: length });
+        }
+    };
+    sums.summary(field, points.len(), pose, iterations, config)
+}
+
+/// Slopes and curvatures summed over the beams, in bytes, cells and levers of `2^lever_shift` cells.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    /// 64ths of a byte per cell, and per lever.
+    slope: [i64; 3],
+    /// Bytes per cell²: xx, xy, yy, xt, yt, tt.
+    curvature: [i64; 6],
+    /// Over the inliers.
+    bytes: u32,
+    inliers: u16,
+    overlap: u16,
+    stride: u16,
+    /// Cells in a lever.
+    lever: f32,
+    /// Cell that levers count from.
+    pivot: (i32, i32),
+}
+
+impl Sums {
+    /// `None` for a pose out of the field's reach.
+    fn over<F: Field + ?Sized>(
+        field: &F,
+        points: &[ScanPoint],
+        pose: Pose,
+        stride: usize,
+        gate: u8,
+    ) -> Option<Self> {
+        let placement = Placement::new(field.shape(), pose)?;
+        let shape = field.shape();
+        // 32 m make at most 256 levers.
+        let reach = 32.8 / shape.resolution();
+        let mut lever_shift = 0;
+        while reach > (256u32 << lever_shift) as f32 {
+            lever_shift += 1;
+        }
+        let fine = (placement.shift - 6) & 31;
+        let inside = |place: u32, side: u16| {
+            let cell = (place as i32 >> placement.shift).max(0);
+            cell.min(i32::from(side) - 1)
+        };
+        let pivot = (
+            inside(placement.x, shape.width()),
+            inside(placement.y, shape.height()),
+        );
+        let mut sums = Self {
+            stride: stride as u16,
+            lever: (1u32 << lever_shift) as f32,
+            pivot,
+            ..Self::default()
+        };
+        let unexplored = field.scale().unexplored;
+        let passes = Pass {
+            fine,
+            lever_shift: (lever_shift + 6) & 31,
+            pivot: ((pivot.0 << 6) as u32, (pivot.1 << 6) as u32),
+            gate: i32::from(gate),
+            unexplored: i32::from(unexplored),
+            // Half a 64th of a cell, so that cutting the rest off rounds.
+            placement: Placement {
+                x: placement.x.wrapping_add(1 << ((placement.shift - 7) & 31)),
+                y: placement.y.wrapping_add(1 << ((placement.shift - 7) & 31)),
+                ..placement
+            },
+        };
+        for chunk in points.chunks(16 * stride) {
+            let part = passes.sum(field, chunk, stride);
+            for (total, part) in sums.slope.iter_mut().zip(part.slope) {
+                *total += i64::from(part);
+            }
+            for (total, part) in sums.curvature.iter_mut().zip(part.curvature) {
+                *total += i64::from(part);
+            }
+            sums.bytes += part.bytes;
+            sums.inliers += part.inliers as u16;
+            sums.overlap += part.overlap as u16;
+        }
+        Some(sums)
+    }
+
+    fn needed(&self, config: &FieldConfig, beams: usize) -> u16 {
+        let share = math::round_to_i32(config.min_share * beams as f32) as u16;
+        config.min_inliers.max(share) / self.stride.max(1)
+    }
+
+    /// Minus the second derivative of the sum of bytes, over (x, y, heading): bytes/cell², bytes/(cell·rad), bytes/rad².
+    fn curvature(&self) -> Sym3 {
+        let [xx, xy, yy, xt, yt, tt] = self.curvature.map(|sum| -(sum as f32));
+        Sym3 {
+            xx,
+            xy,
+            xt,
+            yy,
+            yt,
+            tt,
+        }
+        .theta_scaled(self.lever)
+    }
+
+    /// Curvature of one beam that meets a wall head-on: what its parabola loses one cell away.
+    fn wall<F: Field + ?Sized>(field: &F) -> f32 {
+        let cells = field.shape().resolution() / field.scale().sigma;
+        cells * cells / field.scale().step
+    }
+
+    /// Newton step (cells, cells, rad).
+    fn step(&self, config: &FieldConfig) -> Option<[f32; 3]> {
+        let [gx, gy, gt] = self.slope.map(|sum| sum as f32 / 64.0);
+        let slope = [gx, gy, gt * self.lever];
+        let curvature = self.curvature();
+        let lever = self.mean_lever(&curvature);
+        let scaled = curvature.theta_scaled(1.0 / lever);
+        let pairs = scaled.eigen();
+        let strongest = pairs[2].0;
+        if !(strongest > 0.0) {
+            return None;
+        }
+        // Along each axis of the curvature for itself: a weak one keeps the guess.
+        let b = [slope[0], slope[1], slope[2] / lever];
+        let mut step = [0.0f32; 3];
+        let mut any = false;
+        for (value, axis) in pairs {
+            if value < config.weak_share * strongest {
+                continue;
+            }
+            any = true;
+            let along = (axis[0] * b[0] + axis[1] * b[1] + axis[2] * b[2]) / value;
+            for k in 0..3 {
+                step[k] += along * axis[k];
+            }
+        }
+        step[2] /= lever;
+        // Half a metre and a third of a radian at most: the parabolas end long before.
+        let length = math::sqrt(step[0] * step[0] + step[1] * step[1]);
+        let factor = math::min(
+            1.0,
+            math::min(
+                10.0 / math::max(length, 1e-6),
+                0.3 / math::max(math::abs(step[2]), 1e-6),
+            ),
+        );
+        any.then(|| step.map(|s| s * factor))
+    }
+
+    /// Cells that make a turn comparable with a shift.
+    fn mean_lever(&self, curvature: &Sym3) -> f32 {
+        let shift = curvature.xx + curvature.yy;
+        if shift > 0.0 && curvature.tt > 0.0 {
+            math::max(math::sqrt(2.0 * curvature.tt / shift), 1.0)
+        } else {
+            self.lever
+        }
+    }
+
+    /// `pose` moved by a step along the grid's axes, which turns about the pivot.
+    fn moved(&self, shape: &Shape, pose_in_map: Pose, step: [f32; 3]) -> Pose {
+        let lidar = shape.to_cells(Point::new(pose_in_map.x, pose_in_map.y));
+        let (rx, ry) = (lidar.x - self.pivot.0 as f32, lidar.y - self.pivot.1 as f32);
+        let axes = Pose {
+            x: 0.0,
+            y: 0.0,
+            ..shape.origin()
+        };
+        let shift = axes * Point::new(step[0] - step[2] * ry, step[1] + step[2] * rx);
+        Pose::new(
+            pose_in_map.x + shift.x * shape.resolution(),
+            pose_in_map.y + shift.y * shape.resolution(),
+            pose_in_map.theta + step[2],
+        )
+    }
+
+    /// Height of the beams' bytes above an unexplored cell's, as a share of the peak's.
+    fn score(&self, beams: usize, unexplored: u8) -> f32 {
+        let above = self.bytes as f32 - f32::from(self.inliers) * f32::from(unexplored);
+        above / (math::max(beams as f32, 1.0) * (255.0 - f32::from(unexplored)))
+    }
+
+    fn summary<F: Field + ?Sized>(
+        &self,
+        field: &F,
+        beams: usize,
+        pose: Pose,
+        iterations: u8,
+        config: &FieldConfig,
+    ) -> Result<Match, MatchError> {
+        let needed = self.needed(config, beams);
+        if self.inliers < needed {
+            return Err(MatchError::TooFewCorrespondences {
+                found: self.inliers,
+                needed,
+            });
+        }
+        let (resolution, scale) = (field.shape().resolution(), field.scale());
+        let inliers = f32::from(self.inliers);
+        // A byte below the peak is a squared distance: d² = 2σ²·(255 − b)·step.
+        let lost = math::max(255.0 - self.bytes as f32 / inliers, 0.0) * scale.step;
+        let residual = scale.sigma * math::sqrt(2.0 * lost);
+        let sigma = math::max(residual, config.sigma);
+        // In beams: a wall's share of one beam is its normal squared. Then per metre and by the noise.
+        let per_beam = 1.0 / Self::wall(field);
+        let metres = 1.0 / resolution;
+        let cells = self.curvature();
+        let geometry = Sym3 {
+            xx: cells.xx * metres * metres,
+            xy: cells.xy * metres * metres,
+            yy: cells.yy * metres * metres,
+            xt: cells.xt * metres,
+            yt: cells.yt * metres,
+            tt: cells.tt,
+        }
+        .scaled(per_beam * resolution * resolution);
+        // Along the map's axes instead of the grid's.
+        let geometry = Covariance(geometry).rotated(field.shape().origin()).0;
+        let information = geometry.scaled(1.0 / (sigma * sigma));
+        let lever = math::max(self.mean_lever(&cells) * resolution, 1e-3);
+        let [(least, axis), _, (strongest, _)] = geometry.theta_scaled(1.0 / lever).eigen();
+        let weak = (least < config.weak_share * strongest).then(|| WeakDirection {
+            direction: axis,
+            lever,
+            sigma: sigma / math::sqrt(math::max(least, 1e-3)),
+        });
+        // Along a weak direction nothing is known: 1 m of doubt instead of a singular matrix.
+        let floor = if weak.is_some() { 1.0 } else { 0.0 };
+        let covariance =
+            Information(information.plus(&Sym3::diagonal(floor, floor, floor * lever * lever)))
+                .covariance()
+                .ok_or(MatchError::Degenerate)?;
+        Ok(Match {
+            pose,
+            covariance,
+            information: Information(information),
+            inliers: self.inliers,
+            overlap: self.overlap,
+            beams: beams as u16,
+            residual,
+            score: self.score(beams, scale.unexplored),
+            weak,
+            iterations,
+        })
+    }
+}
+
+/// Byte from which on a beam counts, `distance` (m) from the nearest surface; above unexplored in any case.
+fn gate<F: Field + ?Sized>(field: &F, distance: f32) -> u8 {
+    let scale = field.scale();
+    let z = distance / scale.sigma;
+    let byte = 255 - math::round_to_i32(math::min(0.5 * z * z / scale.step, 255.0));
+    (byte.max(0) as u8).max(scale.unexplored.saturating_add(10))
+}
+
+/// What does not change during a pass.
+struct Pass {
+    placement: Placement,
+    /// Right shift to 64ths of a cell.
+    fine: u32,
+    /// And from there to levers.
+    lever_shift: u32,
+    /// 64ths of a cell.
+    pivot: (u32, u32),
+    gate: i32,
+    unexplored: i32,
+}
+
+/// Sums over at most 16 beams, which fit in 32 bits: bytes' differences have 9 bits and a sign, levers 8.
+#[derive(Default)]
+struct Part {
+    slope: [i32; 3],
+    curvature: [i32; 6],
+    bytes: u32,
+    inliers: u32,
+    overlap: u32,
+}
+
+impl Pass {
+    #[inline]
+    fn sum<F: Field + ?Sized>(&self, field: &F, points: &[ScanPoint], stride: usize) -> Part {
+        let mut part = Part::default();
+        let [mut gx, mut gy, mut gt] = part.slope;
+        let [mut sxx, mut sxy, mut syy, mut sxt, mut syt, mut stt] = part.curvature;
+        for point in points.iter().step_by(stride) {
+            let (px, py) = self.placement.place(point);
+            let (fx, fy) = (px >> self.fine, py >> self.fine);
+            let Some(cells) = field.around(fx >> 6, fy >> 6) else {
+                continue;
+            };
+            if cells.here < self.gate {
+                part.overlap += u32::from(cells.here != self.unexplored);
+                continue;
+            }
+            let (dx, dy) = ((fx & 63) as i32, (fy & 63) as i32);
+            let (bx, by) = (cells.here - cells.left, cells.here - cells.below);
+            let (ax, ay) = (cells.right - cells.here, cells.above - cells.here);
+            let (xx, yy) = (ax - bx, ay - by);
+            let xy = cells.corner - cells.above - ax;
+            // The slope half a cell before the middle, and from there on.
+            let slope_x = (bx << 6) + xx * dx + xy * (dy - 32);
+            let slope_y = (by << 6) + yy * dy + xy * (dx - 32);
+            let lx = (fx.wrapping_sub(self.pivot.0) as i32) >> self.lever_shift;
+            let ly = (fy.wrapping_sub(self.pivot.1) as i32) >> self.lever_shift;
+            gx += slope_x;
+            gy += slope_y;
+            gt += slope_y * lx - slope_x * ly;
+            let (xt, yt) = (xy * lx - xx * ly, yy * lx - xy * ly);
+            sxx += xx;
+            sxy += xy;
+            syy += yy;
+            sxt += xt;
+            syt += yt;
+            stt += yt * lx - xt * ly;
+            part.bytes += cells.here as u32;
+            part.inliers += 1;
+        }
+        part.overlap += part.inliers;
+        part.slope = [gx, gy, gt];
+        part.curvature = [sxx, sxy, syy, sxt, syt, stt];
+        part
+    }
+}

@@ -1,0 +1,420 @@
+//! Likelihood that a beam ends in each cell of a map, one byte a cell.
+//!
+//! `z_hit · N(d; 0, σ²) + z_rand / z_max`, with `d` the distance to the nearest surface: Thrun, Burgard, Fox,
+//! *Probabilistic Robotics*, table 6.3. A byte holds the logarithm: 255 a beam that ends on a surface, 1 one
+//! that ends far from all. An unexplored cell, and every place off the map, is worth `1 / z_max`; the byte
+//! that stands for this ([`Scale::unexplored`]) is reserved, so unexplored cells need no test in a sum.
+
+pub mod placement;
+pub mod stamp;
+
+use super::ConfigError;
+use crate::{
+    geometry::Pose,
+    grid::{Grid, GridError, Shape, occupancy},
+    math,
+    scan::points::ScanPoint,
+};
+use placement::Placement;
+
+/// Numbers of table 6.3.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FieldModel {
+    z_hit: f32,
+    z_rand: f32,
+    z_max: f32,
+    sigma: f32,
+}
+
+impl FieldModel {
+    /// σ 0.075 m: 1.5 cells of 5 cm, so that the field bends smoothly from cell to cell; z_rand 0.1; z_max 12 m.
+    pub const DEFAULT: Self = Self {
+        z_hit: 0.9,
+        z_rand: 0.1,
+        z_max: 12.0,
+        sigma: 0.075,
+    };
+
+    /// Weights of hits and of random returns (0.001…0.999, sum 1), longest range (0.5…100 m), spread of hits
+    /// (0.005…1 m).
+    pub const fn new(z_hit: f32, z_rand: f32, z_max: f32, sigma: f32) -> Result<Self, ConfigError> {
+        if !(z_hit >= 0.001 && z_hit <= 0.999) {
+            return Err(ConfigError::Weight { value: z_hit });
+        }
+        if !(z_rand >= 0.001 && z_rand <= 0.999) {
+            return Err(ConfigError::Weight { value: z_rand });
+        }
+        let sum = z_hit + z_rand;
+        if !(sum > 0.9999 && sum < 1.0001) {
+            return Err(ConfigError::Sum { sum });
+        }
+        if !(z_max >= 0.5 && z_max <= 100.0) {
+            return Err(ConfigError::Scale { value: z_max });
+        }
+        if !(sigma >= 0.005 && sigma <= 1.0) {
+            return Err(ConfigError::Scale { value: sigma });
+        }
+        Ok(Self {
+            z_hit,
+            z_rand,
+            z_max,
+            sigma,
+        })
+    }
+
+    /// Spread of hits (m).
+    #[must_use]
+    pub const fn sigma(&self) -> f32 {
+        self.sigma
+    }
+
+    /// Logarithm of the density `distance` metres from the nearest surface (nat, densities per metre).
+    #[must_use]
+    pub fn log_likelihood(&self, distance: f32) -> f32 {
+        /// 1/√(2π).
+        const PEAK: f32 = 0.398_942_28;
+        let z = distance / self.sigma;
+        let hit = self.z_hit * PEAK / self.sigma * math::exp(math::max(-0.5 * z * z, -80.0));
+        math::ln(hit + self.z_rand / self.z_max)
+    }
+
+    /// How its bytes are to be read.
+    #[must_use]
+    pub fn scale(&self) -> Scale {
+        let peak = self.log_likelihood(0.0);
+        let floor = math::ln(self.z_rand / self.z_max);
+        let step = (peak - floor) / 254.0;
+        let code = 1 + math::round_to_i32((-math::ln(self.z_max) - floor) / step);
+        Scale {
+            floor,
+            step,
+            // A peak below 1/z_max makes no field; one code at each end stays free.
+            unexplored: if code < 2 {
+                2
+            } else if code > 254 {
+                254
+            } else {
+                code as u8
+            },
+            sigma: self.sigma,
+        }
+    }
+}
+
+/// What a field's bytes mean.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Scale {
+    /// Log-likelihood (nat) of byte 1: `ln(z_rand / z_max)`.
+    pub floor: f32,
+    /// From one byte to the next (nat).
+    pub step: f32,
+    /// The byte of unexplored cells, worth `1 / z_max`; no explored cell has it.
+    pub unexplored: u8,
+    /// Spread of hits (m).
+    pub sigma: f32,
+}
+
+impl Scale {
+    /// Log-likelihood (nat) of a byte.
+    #[must_use]
+    pub fn nats(&self, byte: u8) -> f32 {
+        self.floor + self.step * (f32::from(byte) - 1.0)
+    }
+}
+
+/// The bytes of a model by squared distance: 528 bytes, made once, used where fields are built.
+#[derive(Debug, Clone)]
+pub struct Profile {
+    /// 256ths of a byte over squares of distances in steps of a 256th of `reach_mm2`.
+    bytes: [u16; 258],
+    /// 2³² over `reach_mm2`, rounded down.
+    per_mm2: u32,
+    /// Beyond this the byte is 1 (mm²).
+    reach_mm2: u32,
+    scale: Scale,
+}
+
+impl Profile {
+    /// The profile of `model`, out to where it is flat (4σ).
+    #[must_use]
+    pub fn new(model: &FieldModel) -> Self {
+        let scale = model.scale();
+        let reach = 4.0 * model.sigma;
+        let reach_mm2 = math::round_to_i32(reach * reach * 1e6).unsigned_abs() + 1;
+        let mut bytes = [0; 258];
+        for (k, byte) in bytes.iter_mut().enumerate() {
+            let distance = reach * math::sqrt(k as f32 / 256.0);
+            let value = 1.0 + (model.log_likelihood(distance) - scale.floor) / scale.step;
+            *byte = math::round_to_i32(value * 256.0) as u16;
+        }
+        Self {
+            bytes,
+            per_mm2: (u32::MAX).checked_div(reach_mm2).unwrap_or(0),
+            reach_mm2,
+            scale,
+        }
+    }
+
+    /// How its bytes are to be read.
+    #[must_use]
+    pub fn scale(&self) -> &Scale {
+        &self.scale
+    }
+
+    /// Distance (mm) from which on a cell is worth less than an unexplored one: 2.8σ by default.
+    #[must_use]
+    pub fn hit_reach_mm(&self) -> i32 {
+        let limit = u16::from(self.scale.unexplored) << 8;
+        let steps = self.bytes.iter().take_while(|&&byte| byte >= limit).count() as u32;
+        let square = (u64::from(steps) * u64::from(self.reach_mm2)) >> 8;
+        math::isqrt(square as u32) as i32 + 1
+    }
+
+    /// The byte of a cell whose middle is so far from the nearest surface (mm²).
+    #[must_use]
+    pub fn byte(&self, square_mm2: u32) -> u8 {
+        if square_mm2 >= self.reach_mm2 {
+            return 1;
+        }
+        // Below 2³²: `per_mm2` is at most 2³² over `reach_mm2`.
+        let place = square_mm2.wrapping_mul(self.per_mm2) >> 16;
+        let entry = (place >> 8) as usize;
+        let (Some(&low), Some(&high)) = (self.bytes.get(entry), self.bytes.get(entry + 1)) else {
+            return 1;
+        };
+        let (low, high) = (i32::from(low), i32::from(high));
+        let fine = low + (((high - low) * (place & 255) as i32) >> 8);
+        let byte = ((fine + 128) >> 8) as u8;
+        if byte != self.scale.unexplored {
+            byte
+        } else if fine >= i32::from(byte) << 8 {
+            byte + 1
+        } else {
+            byte - 1
+        }
+    }
+}
+
+/// Sum of the bytes in which a scan's beams end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Score {
+    /// Sum of bytes, 255 a beam at most.
+    pub sum: u32,
+    /// Beams summed.
+    pub beams: u16,
+}
+
+impl Score {
+    /// Log-likelihood of the scan, its beams taken as independent (nat): over-confident, so temper it.
+    #[must_use]
+    pub fn nats(&self, scale: &Scale) -> f32 {
+        let beams = f32::from(self.beams);
+        beams * (scale.floor - scale.step) + scale.step * self.sum as f32
+    }
+
+    /// Share of the best possible score, 0…1.
+    #[must_use]
+    pub fn share(&self) -> f32 {
+        if self.beams == 0 {
+            return 0.0;
+        }
+        self.sum as f32 / (255.0 * f32::from(self.beams))
+    }
+}
+
+/// A cell's byte with those beside it.
+#[derive(Debug, Clone, Copy)]
+pub struct Around {
+    /// The cell's own.
+    pub here: i32,
+    /// One column less.
+    pub left: i32,
+    /// One column more.
+    pub right: i32,
+    /// One row less.
+    pub below: i32,
+    /// One row more.
+    pub above: i32,
+    /// One column and one row more.
+    pub corner: i32,
+}
+
+/// Cells that beams can be looked up in: a whole table, or tiles.
+pub trait Field {
+    /// Size, resolution and place.
+    fn shape(&self) -> &Shape;
+
+    /// What the bytes mean.
+    fn scale(&self) -> &Scale;
+
+    /// The byte in column `x` and row `y`, that of unexplored cells off the field.
+    fn byte(&self, x: u32, y: u32) -> u8;
+
+    /// The byte with its neighbours; `None` at the edge and off the field.
+    fn around(&self, x: u32, y: u32) -> Option<Around>;
+
+    /// How well `points` fit, seen from `map_from_lidar`; a pose out of reach scores as all unexplored.
+    fn score(&self, points: &[ScanPoint], map_from_lidar: Pose) -> Score {
+        let sum = match Placement::new(self.shape(), map_from_lidar) {
+            Some(placement) => sum_bytes(self, points, &placement),
+            None => points.len() as u32 * u32::from(self.scale().unexplored),
+        };
+        Score {
+            sum,
+            beams: points.len() as u16,
+        }
+    }
+}
+
+/// Sum of the bytes that `points` end in.
+pub(crate) fn sum_bytes<F: Field + ?Sized>(
+    field: &F,
+    points: &[ScanPoint],
+    placement: &Placement,
+) -> u32 {
+    let mut sum = 0;
+    for point in points {
+        let (x, y) = placement.cell(point);
+        sum += u32::from(field.byte(x, y));
+    }
+    sum
+}
+
+/// A field that is one table.
+#[derive(Debug, Clone, Copy)]
+pub struct LikelihoodField<S> {
+    grid: Grid<S>,
+    scale: Scale,
+}
+
+impl<S: AsRef<[u8]>> LikelihoodField<S> {
+    /// A field over finished bytes, such as a table in flash.
+    ///
+    /// Fails where the fixed-point coordinates cannot reach all of it and 32 m around it.
+    pub fn new(grid: Grid<S>, scale: Scale) -> Result<Self, GridError> {
+        Placement::check(grid.shape())?;
+        Ok(Self { grid, scale })
+    }
+
+    /// The cells.
+    #[must_use]
+    pub fn grid(&self) -> &Grid<S> {
+        &self.grid
+    }
+
+    /// The same field, borrowed: what the matchers take.
+    #[must_use]
+    pub fn as_slice(&self) -> LikelihoodField<&[u8]> {
+        LikelihoodField {
+            grid: self.grid.as_slice(),
+            scale: self.scale,
+        }
+    }
+
+    /// The storage.
+    #[must_use]
+    pub fn into_cells(self) -> S {
+        self.grid.into_cells()
+    }
+}
+
+impl<S: AsRef<[u8]> + AsMut<[u8]>> LikelihoodField<S> {
+    /// A field with nothing explored, for [`stamp::Stamper`].
+    pub fn unexplored(shape: Shape, cells: S, scale: Scale) -> Result<Self, GridError> {
+        let mut grid = Grid::new(shape, cells)?;
+        grid.cells_mut().fill(scale.unexplored);
+        Self::new(grid, scale)
+    }
+
+    /// The field of an occupancy map: [`occupancy`] bytes in, `squares` from [`crate::grid::distance::squared`].
+    ///
+    /// Unknown cells stay unexplored unless they are near enough to an occupied one for a hit to end there.
+    pub fn from_map(
+        map: &Grid<&[u8]>,
+        squares: &[u16],
+        profile: &Profile,
+        cells: S,
+    ) -> Result<Self, GridError> {
+        let (needed, passed) = (map.cells().len(), squares.len());
+        if needed != passed {
+            return Err(GridError::Storage { needed, passed });
+        }
+        let mut field = Self::unexplored(*map.shape(), cells, *profile.scale())?;
+        let unexplored = field.scale.unexplored;
+        let cell_mm2 = map.shape().resolution() * map.shape().resolution() * 1e6;
+        for ((&square, &occupancy), byte) in
+            squares.iter().zip(map.cells()).zip(field.grid.cells_mut())
+        {
+            let square_mm2 = math::min(f32::from(square) * cell_mm2, 4e9) as u32;
+            let value = profile.byte(square_mm2);
+            let known = occupancy::cell(occupancy) != occupancy::Cell::Unknown;
+            *byte = if known || value > unexplored {
+                value
+            } else {
+                unexplored
+            };
+        }
+        Ok(field)
+    }
+}
+
+impl<S: AsRef<[u8]> + AsMut<[u8]>> stamp::Canvas for LikelihoodField<S> {
+    fn shape(&self) -> &Shape {
+        self.grid.shape()
+    }
+
+    fn raise(&mut self, x: i32, y: i32, byte: u8) {
+        if let Some(cell) = self.grid.get_mut(x, y).filter(|cell| **cell < byte) {
+            *cell = byte;
+        }
+    }
+}
+
+impl Field for LikelihoodField<&[u8]> {
+    fn shape(&self) -> &Shape {
+        self.grid.shape()
+    }
+
+    fn scale(&self) -> &Scale {
+        &self.scale
+    }
+
+    #[inline]
+    fn byte(&self, x: u32, y: u32) -> u8 {
+        let width = u32::from(self.grid.shape().width());
+        // Rows below 2¹⁷ and columns below 2¹⁴ (see `Placement`): the product cannot wrap.
+        let index = y.wrapping_mul(width).wrapping_add(x) as usize;
+        match self.grid.cells().get(index) {
+            Some(&byte) if x < width => byte,
+            _ => self.scale.unexplored,
+        }
+    }
+
+    #[inline]
+    fn around(&self, x: u32, y: u32) -> Option<Around> {
+        let width = usize::from(self.grid.shape().width());
+        if x.wrapping_sub(1) >= (width as u32).wrapping_sub(2) {
+            return None;
+        }
+        let index = (y as usize).wrapping_mul(width).wrapping_add(x as usize);
+        let start = index.wrapping_sub(width);
+        let rows = self.grid.cells().get(start..)?;
+        let (&below, &left, &here) = (rows.first()?, rows.get(width - 1)?, rows.get(width)?);
+        let (&right, &above, &corner) = (
+            rows.get(width + 1)?,
+            rows.get(2 * width)?,
+            rows.get(2 * width + 1)?,
+        );
+        Some(Around {
+            here: i32::from(here),
+            left: i32::from(left),
+            right: i32::from(right),
+            below: i32::from(below),
+            above: i32::from(above),
+            corner: i32::from(corner),
+        })
+    }
+}
