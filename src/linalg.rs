@@ -201,6 +201,9 @@ impl Sym3 {
 
 /// One Jacobi rotation that clears `m[p][q]`; `r` is the third index, `v` holds eigenvectors as rows.
 fn rotate(m: &mut [[f32; 3]; 3], v: &mut [[f32; 3]; 3], p: usize, q: usize, r: usize) {
+    if p > 2 || q > 2 || r > 2 {
+        return;
+    }
     let off = m[p][q];
     if off == 0.0 {
         return;

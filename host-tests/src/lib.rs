@@ -1,6 +1,11 @@
 //! Host side of beamfix: simulator, readers, pictures.
 
+pub mod board;
 pub mod decode;
 pub mod encoder;
+pub mod hash;
+pub mod picture;
+pub mod pipeline;
 pub mod readers;
+pub mod recording;
 pub mod sim;

@@ -1,2 +1,7 @@
-//! The `beamfix` tool.
-fn main() {}
+//! The `beamfix` tool: simulate, replay, match pairs, decode, verify.
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::run()
+}

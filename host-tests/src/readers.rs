@@ -4,6 +4,7 @@
 //! the cut and says so in [`Log::cut`]; a file without a usable scan is an error of one line.
 
 pub mod bytes;
+pub mod capture;
 pub mod carmen;
 pub mod clock;
 pub mod lscan;

@@ -15,7 +15,7 @@ pub mod robot;
 pub mod scenes;
 pub mod world;
 
-pub use drive::{Drive, Settings, drive};
+pub use drive::{Drive, Moment, Settings, drive};
 pub use lidar::{Ranging, Still};
 pub use noise::Noise;
 pub use pose::TruePose;

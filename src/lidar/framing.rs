@@ -136,11 +136,13 @@ impl<const L: usize> Framer<L> {
             return;
         }
         self.needed = 1;
-        if count < self.len {
-            self.buffer.copy_within(count..self.len, 0);
-            self.len -= count;
-        } else {
-            self.len = 0;
+        // The length is never more than L; said in a way that leaves no panic to be proven unreachable.
+        match self.buffer.get_mut(..self.len) {
+            Some(held) if count < held.len() => {
+                held.copy_within(count.., 0);
+                self.len -= count;
+            }
+            _ => self.len = 0,
         }
     }
 }

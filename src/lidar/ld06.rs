@@ -224,7 +224,9 @@ impl Clock {
         self.period_q8 = self
             .period_q8
             .saturating_add_signed(late >> 6)
-            .clamp(self.nominal_q8 - quarter, self.nominal_q8 + quarter);
+            // Not `clamp`, which panics where its limits are the wrong way round.
+            .max(self.nominal_q8 - quarter)
+            .min(self.nominal_q8 + quarter);
         // Half a beam at most: the first beam of a frame stays behind the last of the one before.
         let back = -((self.period_q8 >> 9) as i32);
         self.time_us = steady_us.wrapping_add_signed((late >> 4).max(back));

@@ -93,13 +93,19 @@ const fn stretch(v: i64) -> i32 {
 pub const fn atan2_turn(y: i32, x: i32) -> u16 {
     let (ax, ay) = (x.unsigned_abs(), y.unsigned_abs());
     let (small, large) = if ay <= ax { (ay, ax) } else { (ax, ay) };
-    if large == 0 {
-        return 0;
-    }
     // Both below 2¹⁶, so that the quotient fits in Q16.
     let shift = 32 - (large | 0xffff).leading_zeros() - 16;
-    let ratio = ((small >> shift) << 16) / (large >> shift);
-    let entry = (ratio >> 10) as usize;
+    let divisor = large >> shift;
+    if divisor == 0 {
+        return 0;
+    }
+    let ratio = ((small >> shift) << 16) / divisor;
+    // At most 64, since `small` is not the larger: said here so that the compiler knows it too.
+    let entry = if ratio >> 10 > 64 {
+        64
+    } else {
+        (ratio >> 10) as usize
+    };
     let rest = (ratio & 1023) as i32;
     let (low, high) = (ARC[entry] as i32, ARC[entry + 1] as i32);
     // The table holds sixteenths of the unit: round once, here.

@@ -19,19 +19,19 @@ const TICK: f64 = 0.0005;
 /// How far the wheels tell the truth.
 #[derive(Debug, Clone, Copy)]
 pub struct WheelErrors {
-    /// Radius error of the left and the right wheel (share). Default +1.0 % and −0.6 %: tyres.
+    /// Radius error of the left and the right wheel (share). Default +0.3 % and −0.2 %: tyres.
     pub scale: [f64; 2],
-    /// Random error per square root of metre (m). Default 4 mm.
+    /// Random error per square root of metre (m). Default 1.5 mm.
     pub noise: f64,
-    /// Chance of a slip per second. Default 0.1; a slip lasts 0.3 s and adds up to 40 % to one wheel.
+    /// Chance of a slip per second. Default 0.1; a slip lasts 0.3 s and adds 5 to 25 % to one wheel.
     pub slips_per_s: f64,
 }
 
 impl WheelErrors {
     /// An ordinary small robot on a smooth floor.
     pub const DEFAULT: Self = Self {
-        scale: [0.010, -0.006],
-        noise: 0.004,
+        scale: [0.003, -0.002],
+        noise: 0.0015,
         slips_per_s: 0.1,
     };
 }
@@ -125,7 +125,7 @@ impl Robot {
             if self.noise.even(0.0, 1.0) < self.errors.slips_per_s * PERIOD {
                 self.slip_left = 0.3;
                 let wheel = usize::from(self.noise.even(0.0, 1.0) < 0.5);
-                self.slip[wheel] = self.noise.even(0.1, 0.4);
+                self.slip[wheel] = self.noise.even(0.05, 0.25);
             }
         }
         let mut moved = [0.0; 2];

@@ -58,8 +58,10 @@ pub(super) fn lay(lines: &mut [Line], points: &[ScanPoint]) -> u16 {
     let grid = Grid::new(lines.len());
     let mut count = 0;
     let mut rest = points;
-    while !rest.is_empty() {
-        let (run, others) = rest.split_at(run_length(rest));
+    while let Some((run, others)) = rest.split_at_checked(run_length(rest)) {
+        if run.is_empty() {
+            break;
+        }
         count += lay_run(lines, run, grid);
         rest = others;
     }

@@ -255,8 +255,22 @@ mod tests {
         for (x, y, expected) in [
             (1.0, 0.0, (1.0, 0.0)),
             (-1.0, 0.0, (0.0, 1.0)),
-            (0.0, 1.0, (0.707_106_8, 0.707_106_8)),
-            (0.0, -1.0, (0.707_106_8, -0.707_106_8)),
+            (
+                0.0,
+                1.0,
+                (
+                    core::f32::consts::FRAC_1_SQRT_2,
+                    core::f32::consts::FRAC_1_SQRT_2,
+                ),
+            ),
+            (
+                0.0,
+                -1.0,
+                (
+                    core::f32::consts::FRAC_1_SQRT_2,
+                    -core::f32::consts::FRAC_1_SQRT_2,
+                ),
+            ),
             (0.0, 0.0, (1.0, 0.0)),
         ] {
             let half = principal(x, y);

@@ -1,0 +1,12 @@
+//! Pairs of scans, matched and counted; see `beamfix_emulated::bench`.
+#![no_std]
+#![no_main]
+
+use beamfix_emulated::{bench::Bench, finish, stack::Stack};
+use qemu_m0::clock::Timer;
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    static mut BENCH: Bench<360> = Bench::new();
+    finish(BENCH.run(&mut Timer, &Stack::paint()))
+}

@@ -1,0 +1,19 @@
+//! Lidar bytes in at the UART, frames out at the same UART.
+#![no_std]
+#![no_main]
+
+use beamfix_app::{Board, CONFIG};
+use qemu_m0::uart;
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    static mut APP: Board = Board::new(CONFIG);
+
+    uart::enable();
+    uart::send(APP.ready());
+    loop {
+        if let Some(byte) = uart::received() {
+            uart::send(APP.lidar(byte));
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! QEMU's mps2-an386: its UARTs and its clock, without a HAL.
+#![no_std]
+
+pub mod clock;
+pub mod ring;
+pub mod uart;

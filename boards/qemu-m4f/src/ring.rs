@@ -1,0 +1,54 @@
+//! Bytes on their way from an interrupt to the main loop.
+
+use core::cell::RefCell;
+
+use cortex_m::interrupt::{self, Mutex};
+use heapless::Deque;
+
+/// Up to 2048 bytes, 90 ms of an LD06: what arrives while a match is computed.
+pub struct Ring(Mutex<RefCell<Inner>>);
+
+struct Inner {
+    bytes: Deque<u8, 2048>,
+    lost: u32,
+}
+
+impl Ring {
+    /// Empty.
+    #[allow(clippy::new_without_default, reason = "for statics")]
+    pub const fn new() -> Self {
+        Self(Mutex::new(RefCell::new(Inner {
+            bytes: Deque::new(),
+            lost: 0,
+        })))
+    }
+
+    /// Keeps a byte, or counts it as lost.
+    pub fn push(&self, byte: u8) {
+        self.with(|ring| {
+            if ring.bytes.push_back(byte).is_err() {
+                ring.lost = ring.lost.wrapping_add(1);
+            }
+        });
+    }
+
+    /// The oldest byte.
+    pub fn pop(&self) -> Option<u8> {
+        self.with(|ring| ring.bytes.pop_front())?
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.with(|ring| ring.bytes.is_empty()).unwrap_or(true)
+    }
+
+    /// Bytes that found no room since the start; wrapping.
+    pub fn lost(&self) -> u32 {
+        self.with(|ring| ring.lost).unwrap_or(0)
+    }
+
+    /// Never `None`: with interrupts masked nobody else can hold the cell.
+    fn with<R>(&self, f: impl FnOnce(&mut Inner) -> R) -> Option<R> {
+        interrupt::free(|cs| Some(f(&mut *self.0.borrow(cs).try_borrow_mut().ok()?)))
+    }
+}

@@ -1,0 +1,22 @@
+//! Lidar bytes in at the UART, frames out at the same UART.
+#![no_std]
+#![no_main]
+
+use beamfix_app::{Board, CONFIG};
+use qemu_rv32::uart;
+
+#[riscv_rt::entry]
+fn main() -> ! {
+    static mut APP: Board = Board::new(CONFIG);
+    let app = &raw mut APP;
+    // SAFETY: only the start-up code calls `main`, once.
+    let app = unsafe { &mut *app };
+
+    uart::enable();
+    uart::send(app.ready());
+    loop {
+        if let Some(byte) = uart::received() {
+            uart::send(app.lidar(byte));
+        }
+    }
+}

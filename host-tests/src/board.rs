@@ -1,0 +1,229 @@
+//! The emulated boards: what they are, how their firmware is built and run.
+
+pub mod emulator;
+pub mod recording;
+pub mod stream;
+
+use std::{
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
+
+use anyhow::{Context as _, Result, bail};
+use beamfix_app::telemetry::{Cost, Telemetry};
+
+use recording::Recording;
+
+/// An emulated board.
+#[derive(Debug)]
+pub struct Board {
+    /// As the command line has it.
+    pub name: &'static str,
+    /// What it stands for.
+    pub core: &'static str,
+    /// Its crate: `boards/` and this.
+    package: &'static str,
+    target: &'static str,
+    emulator: &'static str,
+    machine: &'static [&'static str],
+    /// Nanoseconds of emulated time per instruction: 2 to this.
+    icount_shift: u8,
+    /// Which of the machine's UARTs frames leave by and commands come in by; the lidar is on the first.
+    uarts: &'static [Line],
+}
+
+/// What a UART is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Line {
+    Lidar,
+    Telemetry,
+    Commands,
+    /// One UART for both: lidar in, frames out.
+    LidarAndTelemetry,
+}
+
+/// All there are.
+pub const BOARDS: &[Board] = &[
+    Board {
+        name: "m4f",
+        core: "Cortex-M4F",
+        package: "qemu-m4f",
+        target: "thumbv7em-none-eabihf",
+        emulator: "qemu-system-arm",
+        machine: &["-M", "mps2-an386"],
+        icount_shift: 6,
+        uarts: &[Line::Lidar, Line::Telemetry, Line::Commands],
+    },
+    Board {
+        name: "m0",
+        core: "Cortex-M0",
+        package: "qemu-m0",
+        target: "thumbv6m-none-eabi",
+        emulator: "qemu-system-arm",
+        machine: &["-M", "microbit"],
+        icount_shift: 6,
+        uarts: &[Line::LidarAndTelemetry],
+    },
+    Board {
+        name: "rv32",
+        core: "RV32IMC",
+        package: "qemu-rv32",
+        target: "riscv32imc-unknown-none-elf",
+        emulator: "qemu-system-riscv32",
+        machine: &["-M", "virt", "-bios", "none"],
+        icount_shift: 0,
+        uarts: &[Line::LidarAndTelemetry],
+    },
+];
+
+impl Board {
+    /// The board of this name.
+    pub fn named(name: &str) -> Result<&'static Self> {
+        BOARDS
+            .iter()
+            .find(|board| board.name == name)
+            .with_context(|| {
+                let names: Vec<_> = BOARDS.iter().map(|board| board.name).collect();
+                format!("no board {name:?}: there are {}", names.join(", "))
+            })
+    }
+
+    /// Builds one of the board's programs (`""`: the firmware itself); gives the ELF file.
+    pub fn build(&self, program: &str) -> Result<PathBuf> {
+        let folder = root().join("boards").join(self.package);
+        let target_dir = root().join("target/boards");
+        let program = if program.is_empty() {
+            self.package
+        } else {
+            program
+        };
+        let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+            .args(["build", "--release", "--bin", program])
+            .arg("--target-dir")
+            .arg(&target_dir)
+            .current_dir(&folder)
+            // The board's own flags count, not those that this program was started with.
+            .env_remove("RUSTFLAGS")
+            .env_remove("CARGO_ENCODED_RUSTFLAGS")
+            .env_remove("CARGO_BUILD_TARGET")
+            .stdin(Stdio::null())
+            .output()
+            .with_context(|| format!("cargo could not be started in {}", folder.display()))?;
+        if !output.status.success() {
+            bail!(
+                "boards/{}: {program} does not build (`./test setup` adds the targets):\n{}",
+                self.package,
+                String::from_utf8_lossy(&output.stderr)
+            );
+        }
+        Ok(target_dir.join(self.target).join("release").join(program))
+    }
+
+    /// Runs the application over a recording, in the emulator.
+    pub fn replay(&self, recording: &Recording) -> Result<Replay> {
+        let elf = self.build("replay")?;
+        let sent = emulator::run(self, &elf, recording.bytes())?;
+        Replay::from_bytes(&sent)
+            .with_context(|| format!("{}: what the board sent is damaged", self.name))
+    }
+}
+
+/// What the application sent over a recording.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Replay {
+    /// In order, without the costs.
+    pub messages: Vec<Telemetry>,
+    /// From a board: one for every call that sent something.
+    pub costs: Vec<Cost>,
+}
+
+impl Replay {
+    /// Runs the application over a recording, here.
+    #[must_use]
+    pub fn on_host(recording: &Recording) -> Self {
+        let mut app = Box::new(new_app());
+        let mut sent = app.ready().to_vec();
+        for &byte in recording.bytes() {
+            sent.extend_from_slice(app.command(byte));
+        }
+        Self::from_bytes(&sent).expect("the frames were just made")
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        let mut replay = Self::default();
+        let mut receiver = beamfix_app::link::Receiver::new();
+        for &byte in bytes {
+            match receiver.push(byte) {
+                Some(Telemetry::Cost(cost)) => replay.costs.push(cost),
+                Some(message) => replay.messages.push(message),
+                None => {}
+            }
+        }
+        let counters = receiver.counters();
+        let decoded = replay.messages.len() + replay.costs.len();
+        if counters.errors > 0 || decoded != counters.frames as usize {
+            bail!(
+                "{} frames, {decoded} of them understood, {} damaged",
+                counters.frames,
+                counters.errors
+            );
+        }
+        Ok(replay)
+    }
+
+    /// The poses, in order.
+    pub fn poses(&self) -> impl Iterator<Item = &beamfix_app::telemetry::Pose> {
+        self.messages.iter().filter_map(|message| match message {
+            Telemetry::Pose(pose) => Some(pose),
+            _ => None,
+        })
+    }
+}
+
+/// The first pose in which two runs differ, in words; `None` where every bit of every pose is the same.
+pub fn difference<'a>(
+    a: impl IntoIterator<Item = &'a beamfix_app::telemetry::Pose>,
+    b: impl IntoIterator<Item = &'a beamfix_app::telemetry::Pose>,
+) -> Option<String> {
+    let (mut a, mut b) = (a.into_iter(), b.into_iter());
+    for k in 0.. {
+        match (a.next(), b.next()) {
+            (None, None) => break,
+            (Some(a), Some(b)) if bits(a) == bits(b) => {}
+            (Some(a), Some(b)) => return Some(format!("scan {k}: {a:?} is not {b:?}")),
+            (None, Some(_)) => return Some(format!("scan {k}: missing in the first run")),
+            (Some(_), None) => return Some(format!("scan {k}: missing in the second run")),
+        }
+    }
+    None
+}
+
+/// Everything in a pose, floats as bits: -0 is not 0, and NaN is itself.
+fn bits(pose: &beamfix_app::telemetry::Pose) -> impl PartialEq + use<> {
+    let beamfix_app::telemetry::Pose {
+        sequence,
+        time_us,
+        pose,
+        covariance,
+        verdict,
+        inliers,
+        beams,
+        residual,
+    } = *pose;
+    (
+        (sequence, time_us, verdict, inliers, beams),
+        pose.map(f32::to_bits),
+        covariance.map(f32::to_bits),
+        residual.to_bits(),
+    )
+}
+
+fn new_app() -> beamfix_app::Board {
+    beamfix_app::Board::new(beamfix_app::CONFIG)
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("host-tests lies in the workspace")
+}

@@ -1,0 +1,64 @@
+//! What reaches a board, as the bytes of its command line.
+
+use beamfix::{geometry::Pose, scan::Beam};
+use beamfix_app::{
+    command::{self, Command},
+    link,
+};
+
+/// Commands in order, framed.
+#[derive(Debug, Clone, Default)]
+pub struct Recording {
+    bytes: Vec<u8>,
+}
+
+impl Recording {
+    /// Nothing yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// As sent.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// Bytes of the lidar.
+    pub fn lidar(&mut self, bytes: &[u8]) {
+        for piece in bytes.chunks(command::LIDAR) {
+            self.push(&Command::Lidar(piece));
+        }
+    }
+
+    /// The robot's pose by its wheels; counts for the scan pushed last.
+    pub fn wheels(&mut self, pose: Pose) {
+        let Pose { x, y, theta } = pose;
+        self.push(&Command::Wheels { x, y, theta });
+    }
+
+    /// A whole scan. It is matched when the next one starts, or at [`Recording::end`].
+    pub fn scan(&mut self, beams: &[Beam]) {
+        for (k, piece) in beams.chunks(command::BEAMS).enumerate() {
+            self.push(&Command::Beams {
+                turn_starts: k == 0,
+                beams: piece.iter().map(|&beam| beam.into()).collect(),
+            });
+        }
+    }
+
+    /// Completes the last scan: as if another began with the beam `next`.
+    pub fn end(&mut self, next: Beam) {
+        self.scan(&[next]);
+    }
+
+    fn push(&mut self, command: &Command) {
+        let mut frame = heapless::Vec::<u8, { link::FRAME }>::new();
+        assert!(
+            link::append(command, &mut frame),
+            "a command always fits: {command:?}"
+        );
+        self.bytes.extend_from_slice(&frame);
+    }
+}

@@ -1,0 +1,157 @@
+//! A board's UARTs, live: lidar bytes in, frames out, in lockstep.
+//!
+//! QEMU hands a byte over only when the board's receive register is free, so nothing is lost however slow the
+//! board is. The next piece is sent when the frames due for the last one have come; nothing depends on how fast
+//! this computer is.
+
+use std::{
+    io::{ErrorKind, Read as _, Write as _},
+    os::unix::net::{UnixListener, UnixStream},
+    time::{Duration, Instant},
+};
+
+use anyhow::{Context as _, Result, bail};
+use beamfix_app::{link::Receiver, telemetry::Telemetry};
+
+use super::{
+    Board, Line,
+    emulator::{Folder, Running, start},
+};
+
+/// Longest silence of a board that owes an answer.
+const TIMEOUT: Duration = Duration::from_secs(60);
+
+/// A board that runs the firmware, connected to this program.
+pub struct Stream {
+    lidar: UnixStream,
+    /// The same socket as `lidar` on a board with one UART.
+    telemetry: UnixStream,
+    receiver: Receiver,
+    running: Running,
+    _folder: Folder,
+}
+
+impl Stream {
+    /// Builds and starts the firmware; returns when it listens.
+    pub fn open(board: &Board) -> Result<Self> {
+        let elf = board.build("")?;
+        let folder = Folder::new()?;
+        let mut command = start(board, &elf);
+        let mut listeners = Vec::new();
+        for (k, line) in board.uarts.iter().enumerate() {
+            if *line == Line::Commands {
+                command.args(["-serial", "null"]);
+                continue;
+            }
+            let path = folder.0.join(format!("uart{k}"));
+            listeners.push((*line, UnixListener::bind(&path)?));
+            command.arg("-chardev");
+            command.arg(format!("socket,id=u{k},path={}", path.display()));
+            command.args(["-serial", &format!("chardev:u{k}")]);
+        }
+        let mut running = Running::spawn(&mut command, board)?;
+        let (mut lidar, mut telemetry) = (None, None);
+        for (line, listener) in listeners {
+            let socket = accept(&listener)
+                .with_context(|| format!("{}: {}", board.name, running.complaint()))?;
+            match line {
+                Line::Lidar => lidar = Some(socket),
+                Line::Telemetry => telemetry = Some(socket),
+                Line::LidarAndTelemetry => {
+                    lidar = Some(socket.try_clone()?);
+                    telemetry = Some(socket);
+                }
+                Line::Commands => {}
+            }
+        }
+        let (Some(lidar), Some(telemetry)) = (lidar, telemetry) else {
+            bail!("{}: no UART for the lidar or for the frames", board.name);
+        };
+        telemetry.set_read_timeout(Some(TIMEOUT))?;
+        lidar.set_write_timeout(Some(TIMEOUT))?;
+        let mut stream = Self {
+            lidar,
+            telemetry,
+            receiver: Receiver::new(),
+            running,
+            _folder: folder,
+        };
+        match stream.receive()? {
+            Telemetry::Ready(_) => Ok(stream),
+            other => bail!("{}: first came {other:?}, not that it listens", board.name),
+        }
+    }
+
+    /// Sends bytes of the lidar.
+    pub fn send(&mut self, bytes: &[u8]) -> Result<()> {
+        self.lidar
+            .write_all(bytes)
+            .context("the board takes no more bytes")
+    }
+
+    /// Waits for the next message.
+    pub fn receive(&mut self) -> Result<Telemetry> {
+        let mut byte = [0];
+        loop {
+            match self.telemetry.read(&mut byte) {
+                Ok(0) => bail!("the emulator ended: {}", self.running.complaint()),
+                Ok(_) => {
+                    if let Some(message) = self.receiver.push(byte[0]) {
+                        return Ok(message);
+                    }
+                    let errors = self.receiver.counters().errors;
+                    if errors > 0 {
+                        bail!("{errors} damaged frames from the board");
+                    }
+                }
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                    bail!("no answer from the board for {} s", TIMEOUT.as_secs())
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+}
+
+/// Streams lidar bytes through a board's UART and compares every message with what the application sends here.
+///
+/// Gives the number of poses; an error names the first message that differs.
+pub fn compare(board: &Board, bytes: &[u8]) -> Result<usize> {
+    let mut app = Box::new(super::new_app());
+    let mut stream = Stream::open(board)?;
+    let mut here = Receiver::new();
+    let mut poses = 0;
+    for piece in bytes.chunks(1024) {
+        stream.send(piece)?;
+        for &byte in piece {
+            for &sent in app.lidar(byte) {
+                let Some(expected) = here.push::<Telemetry>(sent) else {
+                    continue;
+                };
+                let got = stream.receive()?;
+                if format!("{got:?}") != format!("{expected:?}") {
+                    bail!("{}: pose {poses}: {got:?}, here {expected:?}", board.name);
+                }
+                poses += usize::from(matches!(expected, Telemetry::Pose(_)));
+            }
+        }
+    }
+    Ok(poses)
+}
+
+fn accept(listener: &UnixListener) -> Result<UnixStream> {
+    listener.set_nonblocking(true)?;
+    let end = Instant::now() + TIMEOUT;
+    loop {
+        match listener.accept() {
+            Ok((socket, _)) => {
+                socket.set_nonblocking(false)?;
+                return Ok(socket);
+            }
+            Err(error) if error.kind() == ErrorKind::WouldBlock && Instant::now() < end => {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            Err(error) => return Err(error).context("the emulator does not connect"),
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! The command line: what it takes, how it ends.
+
+mod decode;
+mod output;
+mod replay;
+mod simulate;
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+
+/// From a lidar's bytes to a pose: simulate, replay, match, decode, verify.
+///
+/// Without a subcommand: simulate.
+#[derive(Parser)]
+#[command(version, args_conflicts_with_subcommands = true)]
+struct Tool {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    simulate: simulate::Args,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Simulate(simulate::Args),
+    Replay(replay::Args),
+    Decode(decode::Args),
+}
+
+/// Exit status of a run that could not do its work: a bad file, a bad setting.
+const FAILED: u8 = 2;
+
+/// Does what the command line says.
+pub fn run() -> ExitCode {
+    let tool = Tool::parse();
+    let done: Result<ExitCode> = match tool.command {
+        Some(Command::Decode(args)) => decode::run(&args),
+        Some(Command::Replay(args)) => replay::run(&args),
+        Some(Command::Simulate(args)) => simulate::run(&args),
+        None => simulate::run(&tool.simulate),
+    };
+    done.unwrap_or_else(|error| {
+        eprintln!("beamfix: {error:#}");
+        ExitCode::from(FAILED)
+    })
+}

@@ -1,0 +1,84 @@
+//! `decode`: raw bytes to beams.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, ensure};
+use host_tests::{decode, readers::bytes};
+use serde_json::json;
+
+use super::output;
+
+/// Decode a raw capture into beams, as the sensor itself gives them.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The sensor that the bytes come from.
+    #[arg(long, value_name = "MODEL")]
+    lidar: String,
+    /// The capture, packed with gzip or not.
+    file: PathBuf,
+    /// Where to write `scan,time_us,angle_deg,range_mm,quality`; an empty range is no return.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Decodes the file.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let name = args.file.display();
+    let content = bytes::load(&args.file)?;
+    let mut csv = args.csv.as_deref().map(output::create).transpose()?;
+    let mut written = Ok(());
+    if let Some(csv) = &mut csv {
+        written = writeln!(csv, "scan,time_us,angle_deg,range_mm,quality");
+    }
+    let summary = decode::decode(&args.lidar, &content.bytes, &mut |row| {
+        if let (Some(csv), Ok(())) = (&mut csv, &written) {
+            let range = row.range_mm.map_or(String::new(), |mm| mm.to_string());
+            let beam = row.beam.time_us;
+            written = writeln!(
+                csv,
+                "{},{beam},{},{range},{}",
+                row.scan, row.angle_deg, row.quality
+            );
+        }
+    })?;
+    written
+        .and_then(|()| csv.as_mut().map_or(Ok(()), Write::flush))
+        .with_context(|| {
+            args.csv
+                .as_ref()
+                .map_or(String::new(), |path| path.display().to_string())
+        })?;
+    ensure!(
+        summary.packets > 0,
+        "{name}: no packet of an {} in {} bytes; {} failed their check",
+        args.lidar,
+        content.bytes.len(),
+        summary.check_errors
+    );
+    let decode::Summary {
+        packets,
+        check_errors,
+        skipped_bytes,
+        tail_bytes,
+        scans,
+        points,
+    } = summary;
+    let value = json!({
+        "lidar": args.lidar, "bytes": content.bytes.len(), "packets": packets, "check_errors": check_errors,
+        "skipped_bytes": skipped_bytes, "tail_bytes": tail_bytes, "scans": scans, "points": points,
+    });
+    let text = format!(
+        "{packets} packets, {points} points, {scans} turns; {check_errors} frames failed their check, \
+         {skipped_bytes} bytes skipped, {tail_bytes} left at the end"
+    );
+    output::report(args.json, &value, &text)?;
+    match content.cut {
+        Some(cut) => Err(anyhow::anyhow!("{name}: {cut}")),
+        None => Ok(ExitCode::SUCCESS),
+    }
+}

@@ -1,0 +1,182 @@
+//! `replay`: the firmware's pipeline over a recorded log.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Result, anyhow, bail};
+use beamfix::geometry::Pose;
+use beamfix::odometry::{Counters, OdometryConfig};
+use beamfix::scan::Mount;
+use clap::ValueEnum;
+use host_tests::hash::PoseHash;
+use host_tests::pipeline::Pipeline;
+use host_tests::readers::{self, Log, capture};
+use serde_json::json;
+
+use super::output;
+
+/// Run the firmware's pipeline over a recorded log: CARMEN .log, .lscan, or a raw serial capture; packed or not.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The log.
+    log: PathBuf,
+    /// Take the log as raw bytes of this sensor.
+    #[arg(long, value_name = "MODEL")]
+    lidar: Option<String>,
+    /// What runs over the scans.
+    #[arg(long, value_enum, default_value_t = Mode::Odometry)]
+    mode: Mode,
+    /// Where the guess for each match comes from: the log's wheel odometry, or the last velocity.
+    #[arg(long, value_enum, default_value_t = Prior::Odometry)]
+    prior: Prior,
+    /// The memory configuration.
+    #[arg(long, value_enum, default_value_t = Tier::Large)]
+    tier: Tier,
+    /// Where to write a line `timestamp x y theta` for every scan.
+    #[arg(long, value_name = "FILE")]
+    trajectory: Option<PathBuf>,
+    /// The lidar's place on the robot (m, m, deg), where the log does not tell or tells it wrong.
+    #[arg(long, value_name = "X,Y,DEG", value_parser = mount, allow_hyphen_values = true)]
+    mount: Option<Pose>,
+    /// Stop after so many scans.
+    #[arg(long, value_name = "N")]
+    scans: Option<usize>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Mode {
+    Odometry,
+    Slam,
+    Localize,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Prior {
+    Odometry,
+    None,
+}
+
+/// Compiled memory configurations: how many beams a turn may have.
+#[derive(Clone, Copy, ValueEnum)]
+enum Tier {
+    /// 360 beams.
+    #[value(name = "16k")]
+    Small,
+    /// 512 beams.
+    #[value(name = "64k")]
+    Middle,
+    /// 1024 beams.
+    #[value(name = "192k")]
+    Large,
+    /// 2048 beams.
+    #[value(name = "512k")]
+    Huge,
+}
+
+/// What a replay came to.
+struct Outcome {
+    counters: Counters,
+    refused_beams: usize,
+    hash: PoseHash,
+    last: Pose,
+}
+
+/// Replays the log.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    if args.mode != Mode::Odometry {
+        bail!("--mode: only odometry is built so far");
+    }
+    let log = match &args.lidar {
+        Some(lidar) => capture::read(&args.log, lidar)?,
+        None => readers::read(&args.log)?,
+    };
+    let outcome = match args.tier {
+        Tier::Small => replay::<360>(args, &log),
+        Tier::Middle => replay::<512>(args, &log),
+        Tier::Large => replay::<1024>(args, &log),
+        Tier::Huge => replay::<2048>(args, &log),
+    }?;
+    let Counters {
+        scans,
+        refused,
+        keyframes,
+        lost,
+    } = outcome.counters;
+    let value = json!({
+        "scans": scans, "refused": refused, "keyframes": keyframes, "lost": lost, "loops": 0,
+        "refused_beams": outcome.refused_beams, "skipped": log.skipped, "bad_readings": log.bad_readings,
+        "pose_hash": outcome.hash.to_string(),
+    });
+    let Pose { x, y, theta } = outcome.last;
+    let mut text = format!(
+        "{scans} scans, {refused} refused, {keyframes} keyframes, {lost} times lost\n\
+         last pose {x:.3} m {y:.3} m {:.2}°\npose hash {}",
+        theta.to_degrees(),
+        outcome.hash
+    );
+    if outcome.refused_beams > 0 {
+        text += &format!(
+            "\n{} beams found no room in this tier",
+            outcome.refused_beams
+        );
+    }
+    output::report(args.json, &value, &text)?;
+    if let Some(remarks) = log.remarks() {
+        eprintln!("beamfix: {}: {remarks}", args.log.display());
+    }
+    match &log.cut {
+        Some(cut) => Err(anyhow!("{}: {cut}", args.log.display())),
+        None => Ok(ExitCode::SUCCESS),
+    }
+}
+
+fn replay<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
+    let robot_from_lidar = args.mount.unwrap_or(log.robot_from_lidar);
+    let config = OdometryConfig {
+        mount: Mount {
+            robot_from_lidar,
+            ..Mount::DEFAULT
+        },
+        ..OdometryConfig::DEFAULT
+    };
+    let mut pipeline = Pipeline::<N>::new(config);
+    let mut trajectory = args.trajectory.as_deref().map(output::create).transpose()?;
+    let count = args
+        .scans
+        .map_or(log.scans.len(), |most| most.min(log.scans.len()));
+    let bar = output::progress(count, "replaying");
+    let mut last = Pose::IDENTITY;
+    for scan in &log.scans[..count] {
+        let wheels = scan.wheels.filter(|_| args.prior == Prior::Odometry);
+        last = pipeline.step(&scan.beams, wheels).pose;
+        if let Some(file) = &mut trajectory {
+            writeln!(file, "{} {} {} {}", scan.stamp, last.x, last.y, last.theta)?;
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    if let Some(mut file) = trajectory {
+        file.flush()?;
+    }
+    Ok(Outcome {
+        counters: pipeline.counters(),
+        refused_beams: pipeline.refused_beams,
+        hash: pipeline.hash,
+        last,
+    })
+}
+
+/// `x,y,degrees`.
+fn mount(text: &str) -> Result<Pose> {
+    let numbers: Vec<f32> = text.split(',').map(str::parse).collect::<Result<_, _>>()?;
+    match numbers[..] {
+        [x, y, degrees] if numbers.iter().all(|v| v.is_finite()) => {
+            Ok(Pose::new(x, y, degrees.to_radians()))
+        }
+        _ => bail!("three numbers wanted: x,y,degrees"),
+    }
+}

@@ -1,0 +1,250 @@
+//! `simulate`, the default: a robot drives through a flat, and its lidar's bytes are all that the library gets.
+
+use std::fs;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use beamfix::geometry::{Point, Pose};
+use beamfix::odometry::{Counters, OdometryConfig};
+use beamfix::scan::Mount;
+use host_tests::picture::{self, colour, map};
+use host_tests::pipeline::{Pipeline, places};
+use host_tests::readers::capture::{self, Turn};
+use host_tests::recording::Recording;
+use host_tests::sim::{self, Drive, Settings, TruePose};
+use serde_json::json;
+
+use super::output;
+
+/// Drive a simulated robot through a flat: ray casting, lidar bytes, driver, matcher, pose.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Where to write map.png, trajectory.txt, truth.txt, run.mcap.
+    #[arg(long, value_name = "DIR", default_value = "target/beamfix")]
+    out: PathBuf,
+    /// Seed of all randomness.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The lidar on board.
+    #[arg(long, value_name = "MODEL", default_value = "ld06")]
+    lidar: String,
+    /// Stop after so many seconds; the round takes about 90.
+    #[arg(long, default_value_t = Settings::DEFAULT.seconds)]
+    seconds: f64,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Beams that a turn may have.
+const BEAMS: usize = 1024;
+/// Every so many scans are drawn.
+const DRAWN: usize = 4;
+
+/// What the run gives for each scan.
+struct Track {
+    time: f64,
+    estimate: Pose,
+    truth: Pose,
+    wheels: Pose,
+}
+
+/// Drives, matches, writes, reports.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    if !(args.seconds > 0.0) {
+        bail!("--seconds {}: must be above 0", args.seconds);
+    }
+    fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
+    let settings = Settings {
+        seed: args.seed,
+        seconds: args.seconds,
+        ..Settings::DEFAULT
+    };
+    let mut sensor = host_tests::encoder::ld06::Sensor::ld06();
+    let drive = sim::drive(&settings, &mut sensor);
+    let (turns, summary) = capture::turns(&args.lidar, &drive.bytes)?;
+    let Some(origin) = turns.first().and_then(|turn| moment(&drive, turn)) else {
+        bail!(
+            "--seconds {}: not one whole turn of the lidar",
+            args.seconds
+        );
+    };
+    let config = OdometryConfig {
+        mount: Mount {
+            robot_from_lidar: settings.mount.into(),
+            ..Mount::DEFAULT
+        },
+        ..OdometryConfig::DEFAULT
+    };
+    let mut pipeline = Pipeline::<BEAMS>::new(config);
+    let mut recording =
+        Recording::create(&args.out.join("run.mcap"), &["estimate", "truth", "wheels"])?;
+    let mut trajectory = output::create(&args.out.join("trajectory.txt"))?;
+    let mut truth = output::create(&args.out.join("truth.txt"))?;
+    let mut track: Vec<Track> = Vec::new();
+    let mut drawn = Vec::new();
+    let bar = output::progress(turns.len(), "matching");
+    for (number, turn) in turns.iter().enumerate() {
+        let Some(now) = moment(&drive, turn) else {
+            break;
+        };
+        let step = pipeline.step(&turn.beams, Some(now.wheels.into()));
+        let at = Track {
+            time: now.time,
+            estimate: step.pose,
+            truth: origin.truth.between(now.truth).into(),
+            wheels: origin.wheels.between(now.wheels).into(),
+        };
+        let before = track.last();
+        let motion = before.map_or(Pose::IDENTITY, |before| {
+            before.estimate.between(at.estimate)
+        });
+        let seconds = before.map_or(0.0, |before| (at.time - before.time) as f32);
+        let points = places(&turn.beams, motion, seconds, settings.mount.into());
+        recording.push(at.time, &points, &[at.estimate, at.truth, at.wheels])?;
+        for (file, pose) in [(&mut trajectory, at.estimate), (&mut truth, at.truth)] {
+            writeln!(file, "{:.6} {} {} {}", at.time, pose.x, pose.y, pose.theta)?;
+        }
+        if number % DRAWN == 0 {
+            drawn.extend(
+                points
+                    .iter()
+                    .map(|&point| in_world(origin.truth, at.estimate * point)),
+            );
+        }
+        track.push(at);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    recording.finish()?;
+    trajectory.flush()?;
+    truth.flush()?;
+
+    let errors = Errors::of(&track);
+    let seconds = drive.moments.last().map_or(0.0, |moment| moment.time);
+    let caption = format!(
+        "{seconds:.0} s, {:.1} m driven; error at the end {:.1} cm, {:.2}°; largest {:.1} cm, {:.2}°",
+        drive.distance,
+        100.0 * errors.last.0,
+        errors.last.1,
+        100.0 * errors.largest.0,
+        errors.largest.1
+    );
+    let picture = map::Map {
+        title: format!(
+            "beamfix: {} in the simulated flat, seed {}",
+            args.lidar, args.seed
+        ),
+        caption: caption.clone(),
+        world: Some(drive.world),
+        points: drawn,
+        paths: vec![
+            path(
+                "wheel odometry alone",
+                colour::ORANGE,
+                2,
+                &track,
+                origin.truth,
+                |t| t.wheels,
+            ),
+            path("true path", colour::GREEN, 6, &track, origin.truth, |t| {
+                t.truth
+            }),
+            path(
+                "estimated path",
+                colour::RED,
+                2,
+                &track,
+                origin.truth,
+                |t| t.estimate,
+            ),
+        ],
+    };
+    picture::save(&picture, &args.out.join("map.png"))?;
+
+    let Counters {
+        scans,
+        refused,
+        keyframes,
+        lost,
+    } = pipeline.counters();
+    let value = json!({
+        "lidar": args.lidar, "seed": args.seed,
+        "final_error_m": errors.last.0, "final_error_deg": errors.last.1,
+        "max_error_m": errors.largest.0, "max_error_deg": errors.largest.1,
+        "wheels_error_m": errors.wheels.0, "wheels_error_deg": errors.wheels.1,
+        "distance_m": drive.distance, "seconds": seconds, "scans": scans,
+        "refused": refused, "keyframes": keyframes, "lost": lost, "refused_beams": pipeline.refused_beams,
+        "bytes": drive.bytes.len(), "packets": summary.packets, "pose_hash": pipeline.hash.to_string(),
+    });
+    let text = format!(
+        "{caption}\nwheels alone: {:.1} cm, {:.2}° at the end\n{} bytes, {} packets, {} scans, {} refused, {} keyframes\n\
+         pose hash {}\nwritten to {}: map.png trajectory.txt truth.txt run.mcap",
+        100.0 * errors.wheels.0,
+        errors.wheels.1,
+        drive.bytes.len(),
+        summary.packets,
+        scans,
+        refused,
+        keyframes,
+        pipeline.hash,
+        args.out.display()
+    );
+    output::report(args.json, &value, &text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The robot at a turn's last beam.
+fn moment(drive: &Drive, turn: &Turn) -> Option<sim::Moment> {
+    drive.moments.get(turn.ends_at.checked_sub(1)?).copied()
+}
+
+fn in_world(origin: TruePose, point: Point) -> [f64; 2] {
+    let place = origin.then(TruePose::new(f64::from(point.x), f64::from(point.y), 0.0));
+    [place.x, place.y]
+}
+
+fn path(
+    name: &str,
+    colour: plotters::style::RGBColor,
+    width: u32,
+    track: &[Track],
+    origin: TruePose,
+    pose: impl Fn(&Track) -> Pose,
+) -> map::Path {
+    let places = track.iter().map(|at| {
+        let pose = pose(at);
+        in_world(origin, Point::new(pose.x, pose.y))
+    });
+    map::Path {
+        name: name.to_owned(),
+        colour,
+        width,
+        places: places.collect(),
+    }
+}
+
+/// Errors in metres and degrees.
+struct Errors {
+    last: (f64, f64),
+    largest: (f64, f64),
+    wheels: (f64, f64),
+}
+
+impl Errors {
+    fn of(track: &[Track]) -> Self {
+        let off = |truth: Pose, found: Pose| {
+            let off = TruePose::from(truth).between(found.into());
+            (off.distance(), off.theta.to_degrees().abs())
+        };
+        let largest = track.iter().map(|at| off(at.truth, at.estimate));
+        let last = track.last();
+        Self {
+            last: last.map_or((0.0, 0.0), |at| off(at.truth, at.estimate)),
+            largest: largest.fold((0.0, 0.0), |a, b| (a.0.max(b.0), a.1.max(b.1))),
+            wheels: last.map_or((0.0, 0.0), |at| off(at.truth, at.wheels)),
+        }
+    }
+}

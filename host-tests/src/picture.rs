@@ -1,0 +1,102 @@
+//! Pictures: PNG and SVG that need no font and no library of the system.
+
+pub mod map;
+
+use std::path::Path;
+use std::sync::Once;
+
+use anyhow::{Context, Result, anyhow};
+use plotters::backend::{BitMapBackend, DrawingBackend};
+use plotters::coord::Shift;
+use plotters::drawing::{DrawingArea, IntoDrawingArea};
+use plotters::prelude::SVGBackend;
+use plotters::style::{FontStyle, RGBColor, WHITE, register_font};
+
+/// The one font of all pictures.
+pub const FONT: &str = "sans-serif";
+
+/// Colours that stay apart on white, also for the colour-blind (Okabe and Ito).
+pub mod colour {
+    use super::RGBColor;
+
+    /// Walls and text.
+    pub const INK: RGBColor = RGBColor(40, 40, 40);
+    /// Measured points.
+    pub const POINTS: RGBColor = RGBColor(86, 140, 190);
+    /// Truth.
+    pub const GREEN: RGBColor = RGBColor(0, 158, 115);
+    /// Estimates.
+    pub const RED: RGBColor = RGBColor(213, 70, 0);
+    /// Wheel odometry, guesses.
+    pub const ORANGE: RGBColor = RGBColor(230, 159, 0);
+    /// References.
+    pub const BLUE: RGBColor = RGBColor(0, 90, 178);
+    /// What was rejected.
+    pub const PURPLE: RGBColor = RGBColor(180, 90, 150);
+}
+
+/// A drawing on some surface: written once, drawn to PNG and SVG.
+pub trait Drawing {
+    /// Width and height (pixels).
+    fn size(&self) -> (u32, u32);
+
+    /// Draws everything on an empty white area.
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()>
+    where
+        B::ErrorType: 'static;
+}
+
+/// Draws into a file: SVG where its name ends so, PNG otherwise.
+pub fn save(drawing: &impl Drawing, path: &Path) -> Result<()> {
+    use_font();
+    let name = || path.display().to_string();
+    let (width, height) = drawing.size();
+    if path.extension().is_some_and(|ending| ending == "svg") {
+        let mut text = String::new();
+        fill(
+            drawing,
+            SVGBackend::with_string(&mut text, (width, height)).into_drawing_area(),
+        )?;
+        return std::fs::write(path, text).with_context(name);
+    }
+    let mut pixels = vec![0; 3 * width as usize * height as usize];
+    fill(
+        drawing,
+        BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area(),
+    )?;
+    let image = image::RgbImage::from_raw(width, height, pixels).context("the picture's size")?;
+    image
+        .save_with_format(path, image::ImageFormat::Png)
+        .with_context(name)
+}
+
+fn fill<B: DrawingBackend>(drawing: &impl Drawing, area: DrawingArea<B, Shift>) -> Result<()>
+where
+    B::ErrorType: 'static,
+{
+    area.fill(&WHITE)?;
+    drawing.draw(&area)?;
+    area.present().map_err(|error| anyhow!("drawing: {error}"))
+}
+
+fn use_font() {
+    static REGISTER: Once = Once::new();
+    REGISTER.call_once(|| {
+        // The bytes are compiled in; a failure would show as a picture that cannot be drawn.
+        let _ = register_font(FONT, FontStyle::Normal, dejavu::sans::regular());
+        let _ = register_font(FONT, FontStyle::Bold, dejavu::sans::bold());
+    });
+}
+
+/// Limits of a drawing in metres that give both axes the same scale in `size` pixels: x, then y.
+#[must_use]
+pub fn equal_axes(low: [f64; 2], high: [f64; 2], size: (u32, u32)) -> [std::ops::Range<f64>; 2] {
+    let pixels = [f64::from(size.0.max(1)), f64::from(size.1.max(1))];
+    let spans = [high[0] - low[0], high[1] - low[1]];
+    let scale = (spans[0] / pixels[0]).max(spans[1] / pixels[1]).max(1e-6) * 1.06;
+    std::array::from_fn(|k| {
+        let middle = 0.5 * (low[k] + high[k]);
+        let half = 0.5 * scale * pixels[k];
+        middle - half..middle + half
+    })
+}

@@ -1,0 +1,56 @@
+//! The firmware in the emulator against the same application here.
+
+use host_tests::{
+    board::{BOARDS, Replay, difference, recording::Recording, stream},
+    encoder::{Echo, Encoder as _, ld06::Sensor},
+};
+
+/// Bytes of an LD06 that stands in a square room, 8 m wide, with a door open, and turns by a degree a second.
+fn square_room(turns: u32) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut sensor = Sensor::ld06();
+    while sensor.next_time_us() < f64::from(turns) * 1e5 {
+        sensor.fire(
+            &mut |time, bearing| {
+                let heading = bearing + time * 1e-6 * 1f64.to_radians();
+                let (s, c) = (libm::sin(heading), libm::cos(heading));
+                let to_wall = 4000.0 / s.abs().max(c.abs());
+                (libm::fabs(s * to_wall - 500.0) > 450.0 || c < 0.0).then_some(Echo {
+                    range_mm: to_wall,
+                    intensity: 200,
+                })
+            },
+            &mut bytes,
+        );
+    }
+    bytes
+}
+
+#[test]
+fn every_board_replays_the_same_bits() {
+    let mut recording = Recording::new();
+    recording.lidar(&square_room(30));
+    let here = Replay::on_host(&recording);
+    assert!(here.poses().count() >= 27, "{}", here.poses().count());
+    for board in BOARDS {
+        let there = board
+            .replay(&recording)
+            .unwrap_or_else(|error| panic!("{error:#}"));
+        assert_eq!(
+            difference(here.poses(), there.poses()),
+            None,
+            "{}",
+            board.name
+        );
+        println!("{}: {:?}", board.name, there.costs.last());
+    }
+}
+
+#[test]
+fn every_board_streams_the_same_bits() {
+    let bytes = square_room(30);
+    for board in BOARDS {
+        let poses = stream::compare(board, &bytes).unwrap_or_else(|error| panic!("{error:#}"));
+        assert!(poses >= 27, "{}: {poses} poses", board.name);
+    }
+}
