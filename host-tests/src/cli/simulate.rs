@@ -39,7 +39,7 @@ pub struct Args {
 }
 
 /// Beams that a turn may have.
-const BEAMS: usize = 1024;
+const BEAMS: usize = beamfix_app::BEAMS;
 /// Every so many scans are drawn.
 const DRAWN: usize = 4;
 
