@@ -2,6 +2,7 @@
 
 mod decode;
 mod output;
+mod pairs;
 mod replay;
 mod simulate;
 
@@ -26,6 +27,7 @@ struct Tool {
 enum Command {
     Simulate(simulate::Args),
     Replay(replay::Args),
+    Pairs(pairs::Args),
     Decode(decode::Args),
 }
 
@@ -38,6 +40,7 @@ pub fn run() -> ExitCode {
     let done: Result<ExitCode> = match tool.command {
         Some(Command::Decode(args)) => decode::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
+        Some(Command::Pairs(args)) => pairs::run(&args),
         Some(Command::Simulate(args)) => simulate::run(&args),
         None => simulate::run(&tool.simulate),
     };

@@ -12,6 +12,7 @@ use clap::ValueEnum;
 use host_tests::hash::PoseHash;
 use host_tests::pipeline::Pipeline;
 use host_tests::readers::{self, Log, capture};
+use host_tests::{size, sized};
 use serde_json::json;
 
 use super::output;
@@ -30,9 +31,9 @@ pub struct Args {
     /// Where the guess for each match comes from: the log's wheel odometry, or the last velocity.
     #[arg(long, value_enum, default_value_t = Prior::Odometry)]
     prior: Prior,
-    /// The memory configuration.
-    #[arg(long, value_enum, default_value_t = Tier::Large)]
-    tier: Tier,
+    /// The memory configuration. Default: the smallest one with room for the log's scans.
+    #[arg(long, value_enum)]
+    tier: Option<Tier>,
     /// Where to write a line `timestamp x y theta` for every scan.
     #[arg(long, value_name = "FILE")]
     trajectory: Option<PathBuf>,
@@ -60,21 +61,21 @@ enum Prior {
     None,
 }
 
-/// Compiled memory configurations: how many beams a turn may have.
+/// Compiled memory configurations, by the RAM of the controller: how many beams a turn may have.
 #[derive(Clone, Copy, ValueEnum)]
 enum Tier {
     /// 360 beams.
     #[value(name = "16k")]
-    Small,
-    /// 512 beams.
+    Small = 360,
+    /// 456 beams: an LD06.
     #[value(name = "64k")]
-    Middle,
-    /// 1024 beams.
+    Middle = 456,
+    /// 720 beams.
     #[value(name = "192k")]
-    Large,
-    /// 2048 beams.
+    Large = 720,
+    /// 1024 beams.
     #[value(name = "512k")]
-    Huge,
+    Huge = 1024,
 }
 
 /// What a replay came to.
@@ -94,12 +95,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Some(lidar) => capture::read(&args.log, lidar)?,
         None => readers::read(&args.log)?,
     };
-    let outcome = match args.tier {
-        Tier::Small => replay::<360>(args, &log),
-        Tier::Middle => replay::<512>(args, &log),
-        Tier::Large => replay::<1024>(args, &log),
-        Tier::Huge => replay::<2048>(args, &log),
-    }?;
+    let size = match args.tier {
+        Some(tier) => tier as usize,
+        None => size::fitting(log.scans.iter().map(|scan| &scan.beams[..])),
+    };
+    let outcome = sized!(size, replay(args, &log))?;
     let Counters {
         scans,
         refused,
@@ -108,7 +108,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     } = outcome.counters;
     let value = json!({
         "scans": scans, "refused": refused, "keyframes": keyframes, "lost": lost, "loops": 0,
-        "refused_beams": outcome.refused_beams, "skipped": log.skipped, "bad_readings": log.bad_readings,
+        "beams": size, "refused_beams": outcome.refused_beams, "skipped": log.skipped, "bad_readings": log.bad_readings,
         "pose_hash": outcome.hash.to_string(),
     });
     let Pose { x, y, theta } = outcome.last;
@@ -120,7 +120,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     );
     if outcome.refused_beams > 0 {
         text += &format!(
-            "\n{} beams found no room in this tier",
+            "\n{} beams found no room: this configuration has {size} a turn",
             outcome.refused_beams
         );
     }

@@ -1,0 +1,80 @@
+//! Memory configurations that are compiled into the tool: how many beams a turn has room for.
+//!
+//! A reference keeps a line for each of N directions, so N is best what the lidar measures in a full turn.
+
+use beamfix::scan::Beam;
+
+/// Beams a turn, smallest first.
+pub const SIZES: [usize; 4] = [360, 456, 720, 1024];
+
+/// The smallest of [`SIZES`] with room for these scans, the largest where none has.
+#[must_use]
+pub fn fitting<'a>(scans: impl Iterator<Item = &'a [Beam]>) -> usize {
+    let (mut longest, mut finest) = (0, 0);
+    for scan in scans {
+        longest = longest.max(scan.len());
+        if finest == 0 && scan.len() > 2 {
+            finest = per_turn(scan);
+        }
+    }
+    let needed = longest.max(finest);
+    let largest = SIZES[SIZES.len() - 1];
+    SIZES
+        .into_iter()
+        .find(|&size| size >= needed)
+        .unwrap_or(largest)
+}
+
+/// Beams that a full turn would have, by the median step between two of a scan.
+fn per_turn(scan: &[Beam]) -> usize {
+    let step =
+        |pair: &[Beam]| (pair[1].bearing.0.wrapping_sub(pair[0].bearing.0) as i16).unsigned_abs();
+    let mut steps: Vec<u16> = scan.windows(2).map(step).collect();
+    steps.sort_unstable();
+    let median = usize::from(steps[steps.len() / 2].max(1));
+    (65_536 + median / 2) / median
+}
+
+/// Calls a function that is generic over N with the N that is `size`, one of [`SIZES`].
+#[macro_export]
+macro_rules! sized {
+    ($size:expr, $function:ident($($argument:expr),*)) => {
+        match $size {
+            ..=360 => $function::<360>($($argument),*),
+            361..=456 => $function::<456>($($argument),*),
+            457..=720 => $function::<720>($($argument),*),
+            _ => $function::<1024>($($argument),*),
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use beamfix::scan::{Bearing, Range};
+
+    #[test]
+    fn sizes_follow_the_step_between_beams() {
+        for (beams, degrees, expected) in [
+            (180, 1.0f32, 360),
+            (361, 0.5, 720),
+            (450, 0.8, 456),
+            (682, 0.351_562_5, 1024),
+            (2000, 0.18, 1024),
+        ] {
+            let beam = |k: usize| Beam {
+                bearing: Bearing::from_radians((k as f32 * degrees).to_radians()),
+                range: Range::from_mm(1000),
+                time_us: 0,
+                quality: 0,
+            };
+            let scan: Vec<Beam> = (0..beams).map(beam).collect();
+            assert_eq!(
+                fitting([&scan[..]].into_iter()),
+                expected,
+                "{beams} beams of {degrees}°"
+            );
+        }
+        assert_eq!(fitting(std::iter::empty()), 360);
+    }
+}
