@@ -1,5 +1,7 @@
 //! The emulated boards: what they are, how their firmware is built and run.
 
+pub mod bench;
+pub mod card;
 pub mod emulator;
 pub mod recording;
 pub mod stream;
@@ -26,6 +28,10 @@ pub struct Board {
     target: &'static str,
     emulator: &'static str,
     machine: &'static [&'static str],
+    /// Where the memory for statics and stack starts.
+    ram_start: u64,
+    /// How much of it there is (bytes).
+    ram_bytes: u64,
     /// Nanoseconds of emulated time per instruction: 2 to this.
     icount_shift: u8,
     /// Which of the machine's UARTs frames leave by and commands come in by; the lidar is on the first.
@@ -51,6 +57,8 @@ pub const BOARDS: &[Board] = &[
         target: "thumbv7em-none-eabihf",
         emulator: "qemu-system-arm",
         machine: &["-M", "mps2-an386"],
+        ram_start: 0x2000_0000,
+        ram_bytes: 4 << 20,
         icount_shift: 6,
         uarts: &[Line::Lidar, Line::Telemetry, Line::Commands],
     },
@@ -61,6 +69,8 @@ pub const BOARDS: &[Board] = &[
         target: "thumbv6m-none-eabi",
         emulator: "qemu-system-arm",
         machine: &["-M", "microbit"],
+        ram_start: 0x2000_0000,
+        ram_bytes: 16 << 10,
         icount_shift: 6,
         uarts: &[Line::LidarAndTelemetry],
     },
@@ -71,6 +81,8 @@ pub const BOARDS: &[Board] = &[
         target: "riscv32imc-unknown-none-elf",
         emulator: "qemu-system-riscv32",
         machine: &["-M", "virt", "-bios", "none"],
+        ram_start: 0x8040_0000,
+        ram_bytes: 4 << 20,
         icount_shift: 0,
         uarts: &[Line::LidarAndTelemetry],
     },

@@ -1,5 +1,7 @@
 //! The command line: what it takes, how it ends.
 
+mod bench;
+mod card;
 mod decode;
 mod output;
 mod pairs;
@@ -29,6 +31,8 @@ enum Command {
     Replay(replay::Args),
     Pairs(pairs::Args),
     Decode(decode::Args),
+    Bench(bench::Args),
+    Card(card::Args),
 }
 
 /// Exit status of a run that could not do its work: a bad file, a bad setting.
@@ -41,6 +45,8 @@ pub fn run() -> ExitCode {
         Some(Command::Decode(args)) => decode::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Pairs(args)) => pairs::run(&args),
+        Some(Command::Bench(args)) => bench::run(&args),
+        Some(Command::Card(args)) => card::run(&args),
         Some(Command::Simulate(args)) => simulate::run(&args),
         None => simulate::run(&tool.simulate),
     };

@@ -1,0 +1,116 @@
+//! What a firmware takes: flash, memory, stack, instructions.
+
+use std::{fs, path::Path};
+
+use anyhow::{Context as _, Result, ensure};
+use beamfix_app::telemetry::Cost;
+use object::{Object as _, ObjectSection as _, SectionKind};
+use serde::{Deserialize, Serialize};
+
+use super::{Board, recording::Recording};
+use crate::{
+    encoder::ld06::Sensor,
+    sim::drive::{Settings, drive},
+};
+
+/// One row: a board with the application.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Card {
+    /// As the command line has it.
+    pub board: String,
+    /// What runs.
+    pub configuration: String,
+    /// Code, tables and what the memory is filled with at the start (bytes).
+    pub flash_bytes: u64,
+    /// Statics (bytes).
+    pub ram_bytes: u64,
+    /// Deepest stack over the simulated drive (bytes).
+    pub stack_bytes: u64,
+    /// From the byte that completes a revolution to its pose: median over the drive.
+    pub instructions: u64,
+    /// The same: the worst.
+    pub instructions_max: u64,
+    /// The compiler, on whose version the figures depend a little.
+    pub rustc: String,
+}
+
+/// The drive that the cards are measured over: the first 20 s through the simulated flat.
+#[must_use]
+pub fn recording() -> Recording {
+    let settings = Settings {
+        seconds: 20.0,
+        ..Settings::DEFAULT
+    };
+    let mut recording = Recording::new();
+    recording.lidar(&drive(&settings, &mut Sensor::ld06()).bytes);
+    recording
+}
+
+/// Measures a board.
+pub fn measure(board: &Board, recording: &Recording) -> Result<Card> {
+    let (flash_bytes, ram_bytes) = sizes(&board.build("")?, board.ram_start)?;
+    let replay = board.replay(recording)?;
+    let stack_bytes = replay.costs.iter().map(|cost| cost.stack_bytes).max();
+    let mut instructions: Vec<u32> = replay
+        .costs
+        .iter()
+        // The first revolution has nothing to be matched against.
+        .skip(1)
+        .map(|&Cost { instructions, .. }| instructions)
+        .collect();
+    instructions.sort_unstable();
+    let (Some(stack_bytes), Some(&worst)) = (stack_bytes, instructions.last()) else {
+        anyhow::bail!("{}: no pose came back", board.name);
+    };
+    ensure!(
+        ram_bytes + u64::from(stack_bytes) < board.ram_bytes,
+        "{}: {ram_bytes} bytes of statics and {stack_bytes} of stack are more than the {} there are",
+        board.name,
+        board.ram_bytes
+    );
+    Ok(Card {
+        board: board.name.into(),
+        configuration: format!("LD06, odometry, {} beams", beamfix_app::BEAMS),
+        flash_bytes,
+        ram_bytes,
+        stack_bytes: stack_bytes.into(),
+        instructions: instructions[instructions.len() / 2].into(),
+        instructions_max: worst.into(),
+        rustc: rustc_version()?,
+    })
+}
+
+/// Bytes in flash and of statics in RAM.
+fn sizes(elf: &Path, ram_start: u64) -> Result<(u64, u64)> {
+    let bytes = fs::read(elf).with_context(|| elf.display().to_string())?;
+    let file = object::File::parse(&*bytes).with_context(|| elf.display().to_string())?;
+    let (mut flash, mut ram) = (0, 0);
+    for section in file.sections() {
+        let name = section.name().unwrap_or_default();
+        let kept = !matches!(
+            section.kind(),
+            SectionKind::UninitializedData | SectionKind::UninitializedTls
+        );
+        let loaded = section.address() != 0 || name == ".vector_table";
+        // What the runtimes leave to the heap and the stack is a section too.
+        if !loaded || matches!(name, ".heap" | ".stack") || name.starts_with(".debug") {
+            continue;
+        }
+        if kept {
+            flash += section.size();
+        }
+        if section.address() >= ram_start {
+            ram += section.size();
+        }
+    }
+    Ok((flash, ram))
+}
+
+fn rustc_version() -> Result<String> {
+    let output = std::process::Command::new("rustc")
+        .arg("--version")
+        .output()
+        .context("rustc could not be started")?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    Ok(text.split_whitespace().nth(1).unwrap_or("?").into())
+}

@@ -1,0 +1,65 @@
+//! `card`: what the firmware takes on each emulated board.
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use host_tests::board::{
+    BOARDS, Board,
+    card::{self, Card},
+};
+
+use super::output;
+
+/// Flash, memory, stack and instructions of the firmware on the emulated boards.
+///
+/// `card --json > host-tests/golden/card.json` accepts new figures.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Only this one: m4f, m0 or rv32.
+    #[arg(long, value_name = "NAME")]
+    board: Option<String>,
+    /// Print one JSON list.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Builds, runs, reports.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let recording = card::recording();
+    let boards: Vec<&Board> = match &args.board {
+        Some(name) => vec![Board::named(name)?],
+        None => BOARDS.iter().collect(),
+    };
+    let bar = output::progress(boards.len(), "boards");
+    let mut cards = Vec::new();
+    for board in boards {
+        cards.push(card::measure(board, &recording)?);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let value = serde_json::to_value(&cards)?;
+    let json = serde_json::to_string_pretty(&value)?;
+    let text = if args.json { json } else { table(&cards) };
+    output::report(false, &value, &text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn table(cards: &[Card]) -> String {
+    let mut text = String::from(
+        "board  flash B  RAM B  stack B  instructions per revolution: median, most   configuration",
+    );
+    for card in cards {
+        text += &format!(
+            "\n{:<5} {:>8} {:>6} {:>8} {:>37} {:>8}   {} (rustc {})",
+            card.board,
+            card.flash_bytes,
+            card.ram_bytes,
+            card.stack_bytes,
+            card.instructions,
+            card.instructions_max,
+            card.configuration,
+            card.rustc,
+        );
+    }
+    text
+}

@@ -1,0 +1,47 @@
+//! What the firmware takes on the emulated boards must not rise unnoticed.
+
+use host_tests::board::{
+    BOARDS,
+    card::{Card, measure, recording},
+};
+
+/// A rise by more than this fails: 2 %.
+const ALLOWED: f64 = 1.02;
+
+#[test]
+fn no_figure_rises() {
+    let golden: Vec<Card> =
+        serde_json::from_str(include_str!("../golden/card.json")).expect("a list of cards");
+    let recording = recording();
+    let mut risen = Vec::new();
+    for board in BOARDS {
+        let now = measure(board, &recording).unwrap_or_else(|error| panic!("{error:#}"));
+        println!("{now:?}");
+        let before = golden
+            .iter()
+            .find(|card| card.board == now.board && card.configuration == now.configuration)
+            .unwrap_or_else(|| panic!("golden/card.json has no {}: {}", now.board, now.configuration));
+        for (what, before, now) in [
+            ("flash_bytes", before.flash_bytes, now.flash_bytes),
+            ("ram_bytes", before.ram_bytes, now.ram_bytes),
+            ("stack_bytes", before.stack_bytes, now.stack_bytes),
+            ("instructions", before.instructions, now.instructions),
+            ("instructions_max", before.instructions_max, now.instructions_max),
+        ] {
+            if now as f64 > before as f64 * ALLOWED {
+                risen.push(format!("{}: {what} was {before}, is {now}", board.name));
+            } else if (now as f64) < before as f64 / ALLOWED {
+                println!("{}: {what} fell from {before} to {now}", board.name);
+            }
+        }
+        if before.rustc != now.rustc {
+            println!("measured with rustc {}, now {}", before.rustc, now.rustc);
+        }
+    }
+    assert!(
+        risen.is_empty(),
+        "{}\nIf it must be: cargo run --release -- card --json > host-tests/golden/card.json, with the reason in \
+         the message",
+        risen.join("\n")
+    );
+}
