@@ -35,9 +35,9 @@ pub fn on_board(board: &Board, list: &pairs::Pairs) -> Result<(Vec<Outcome>, u32
         .map(|word| word.try_into().expect("four bytes"));
     let (words, stack) = {
         let words: Vec<[u8; 4]> = words.by_ref().collect();
-        let (stack, words) = words.split_last().map_or(([0; 4], Vec::new()), |(last, rest)| {
-            (*last, rest.to_vec())
-        });
+        let (stack, words) = words
+            .split_last()
+            .map_or(([0; 4], Vec::new()), |(last, rest)| (*last, rest.to_vec()));
         (words, u32::from_le_bytes(stack))
     };
     ensure!(

@@ -35,11 +35,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let board = Board::named(&args.board)?;
     let list = pairs::read_binary(&args.file)?;
-    ensure!(
-        !list.pairs.is_empty(),
-        "{}: no pairs",
-        args.file.display()
-    );
+    ensure!(!list.pairs.is_empty(), "{}: no pairs", args.file.display());
     let (outcomes, stack) = bench::on_board(board, &list)?;
     let same = hash(&outcomes) == hash(&bench::on_host(&list));
 
