@@ -14,6 +14,7 @@ use std::{
 use anyhow::{Context as _, Result, bail};
 use beamfix_app::telemetry::{Cost, Telemetry};
 
+use emulator::Count;
 use recording::Recording;
 
 /// An emulated board.
@@ -131,10 +132,10 @@ impl Board {
         Ok(target_dir.join(self.target).join("release").join(program))
     }
 
-    /// Runs the application over a recording, in the emulator.
-    pub fn replay(&self, recording: &Recording) -> Result<Replay> {
+    /// Runs the application over a recording, in the emulator; the costs are worth something with [`Count::Exact`].
+    pub fn replay(&self, recording: &Recording, count: Count) -> Result<Replay> {
         let elf = self.build("replay")?;
-        let sent = emulator::run(self, &elf, recording.bytes())?;
+        let sent = emulator::run(self, &elf, recording.bytes(), count)?;
         Replay::from_bytes(&sent)
             .with_context(|| format!("{}: what the board sent is damaged", self.name))
     }

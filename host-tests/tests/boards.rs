@@ -1,8 +1,11 @@
 //! The firmware in the emulator against the same application here.
 
+use std::path::{Path, PathBuf};
+
 use host_tests::{
-    board::{BOARDS, Replay, difference, recording::Recording, stream},
+    board::{BOARDS, Replay, difference, emulator::Count, recording::Recording, stream},
     encoder::{Echo, Encoder as _, ld06::Sensor},
+    readers,
 };
 
 /// Bytes of an LD06 that stands in a square room, 8 m wide, with a door open, and turns by a degree a second.
@@ -34,7 +37,7 @@ fn every_board_replays_the_same_bits() {
     assert!(here.poses().count() >= 27, "{}", here.poses().count());
     for board in BOARDS {
         let there = board
-            .replay(&recording)
+            .replay(&recording, Count::None)
             .unwrap_or_else(|error| panic!("{error:#}"));
         assert_eq!(
             difference(here.poses(), there.poses()),
@@ -42,7 +45,6 @@ fn every_board_replays_the_same_bits() {
             "{}",
             board.name
         );
-        println!("{}: {:?}", board.name, there.costs.last());
     }
 }
 
@@ -52,5 +54,33 @@ fn every_board_streams_the_same_bits() {
     for board in BOARDS {
         let poses = stream::compare(board, &bytes).unwrap_or_else(|error| panic!("{error:#}"));
         assert!(poses >= 27, "{}: {poses} poses", board.name);
+    }
+}
+
+#[test]
+fn every_board_replays_a_real_log_to_the_same_bits() {
+    let shared = std::env::var_os("BEAMFIX_SHARED").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
+        PathBuf::from,
+    );
+    let log = shared.join("datasets/logs/intel.lscan");
+    if !log.exists() {
+        println!("left out: {} is not there", log.display());
+        return;
+    }
+    let log = readers::read(&log).unwrap_or_else(|error| panic!("{error:#}"));
+    let recording = Recording::of_log(&log.scans[..1000]);
+    let here = Replay::on_host(&recording);
+    assert_eq!(here.poses().count(), 1000);
+    for board in BOARDS {
+        let there = board
+            .replay(&recording, Count::None)
+            .unwrap_or_else(|error| panic!("{error:#}"));
+        assert_eq!(
+            difference(here.poses(), there.poses()),
+            None,
+            "{}",
+            board.name
+        );
     }
 }

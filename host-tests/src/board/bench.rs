@@ -7,7 +7,10 @@ use beamfix::{
 };
 use beamfix_app::pairs::Pairs;
 
-use super::{Board, emulator};
+use super::{
+    Board,
+    emulator::{self, Count},
+};
 use crate::readers::pairs;
 
 /// Most beams of a scan: what the smallest board has room for.
@@ -29,7 +32,7 @@ pub struct Outcome {
 /// Matches all pairs on a board; gives the peak stack (bytes) too.
 pub fn on_board(board: &Board, list: &pairs::Pairs) -> Result<(Vec<Outcome>, u32)> {
     let elf = board.build("bench")?;
-    let output = emulator::run(board, &elf, &input(list)?)?;
+    let output = emulator::run(board, &elf, &input(list)?, Count::Exact)?;
     let mut words = output
         .chunks_exact(4)
         .map(|word| word.try_into().expect("four bytes"));

@@ -7,7 +7,7 @@ use beamfix_app::telemetry::Cost;
 use object::{Object as _, ObjectSection as _, SectionKind};
 use serde::{Deserialize, Serialize};
 
-use super::{Board, recording::Recording};
+use super::{Board, emulator::Count, recording::Recording};
 use crate::{
     encoder::ld06::Sensor,
     sim::drive::{Settings, drive},
@@ -49,7 +49,7 @@ pub fn recording() -> Recording {
 /// Measures a board.
 pub fn measure(board: &Board, recording: &Recording) -> Result<Card> {
     let (flash_bytes, ram_bytes) = sizes(&board.build("")?, board.ram_start)?;
-    let replay = board.replay(recording)?;
+    let replay = board.replay(recording, Count::Exact)?;
     let stack_bytes = replay.costs.iter().map(|cost| cost.stack_bytes).max();
     let mut instructions: Vec<u32> = replay
         .costs

@@ -6,6 +6,8 @@ use beamfix_app::{
     link,
 };
 
+use crate::readers::Recorded;
+
 /// Commands in order, framed.
 #[derive(Debug, Clone, Default)]
 pub struct Recording {
@@ -38,7 +40,7 @@ impl Recording {
         self.push(&Command::Wheels { x, y, theta });
     }
 
-    /// A whole scan. It is matched when the next one starts, or at [`Recording::end`].
+    /// A whole scan. It is matched when the next one starts.
     pub fn scan(&mut self, beams: &[Beam]) {
         for (k, piece) in beams.chunks(command::BEAMS).enumerate() {
             self.push(&Command::Beams {
@@ -48,9 +50,21 @@ impl Recording {
         }
     }
 
-    /// Completes the last scan: as if another began with the beam `next`.
-    pub fn end(&mut self, next: Beam) {
-        self.scan(&[next]);
+    /// Scans of a log, each with its wheel odometry.
+    #[must_use]
+    pub fn of_log(scans: &[Recorded]) -> Self {
+        let mut recording = Self::new();
+        for recorded in scans {
+            recording.scan(&recorded.beams);
+            if let Some(pose) = recorded.wheels {
+                recording.wheels(pose);
+            }
+        }
+        // The last one is complete when another begins.
+        if let Some(next) = scans.last().and_then(|recorded| recorded.beams.first()) {
+            recording.scan(&[*next]);
+        }
+        recording
     }
 
     fn push(&mut self, command: &Command) {
