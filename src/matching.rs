@@ -2,6 +2,7 @@
 //!
 //! Matchers share a shape, `align(reference, points, guess, config) -> Result<Match, MatchError>`. `Ok` means usable.
 
+pub mod correlative;
 pub mod field;
 pub mod icp;
 

@@ -117,7 +117,7 @@ fn piece(points: &[ScanPoint], index: usize, config: &StampConfig) -> Option<Pie
         let last = index + left.take_while(|pair| together(pair, config)).count();
         let run = points.get(first..=last)?;
         if run.len() < 2 {
-            return Some(alone);
+            return Some(slanted(points, index, config).unwrap_or(alone));
         }
         if let Some(piece) = line_through(run, at(here), f32::from(config.straight_mm)) {
             return Some(piece);
@@ -125,6 +125,17 @@ fn piece(points: &[ScanPoint], index: usize, config: &StampConfig) -> Option<Pie
         reach /= 2;
     }
     Some(alone)
+}
+
+/// A wall seen at so flat an angle that its beams lie far apart: the point is in line with both its neighbours.
+fn slanted(points: &[ScanPoint], index: usize, config: &StampConfig) -> Option<Piece> {
+    let run = points.get(index.checked_sub(1)?..=index + 1)?;
+    let here = Point::new(
+        f32::from(points.get(index)?.x),
+        f32::from(points.get(index)?.y),
+    );
+    let piece = line_through(run, here, f32::from(config.straight_mm))?;
+    Some(Piece { half: 1.0, ..piece })
 }
 
 /// Whether two beams in a row end on the same surface.

@@ -1,0 +1,178 @@
+//! A scan with one heading, ready to be summed at many places: each beam an index, four places an addition.
+
+use super::{pyramid::Pyramid, stride};
+use crate::{
+    geometry::Pose,
+    scan::points::ScanPoint,
+    sensor_model::likelihood_field::{Field, placement::Placement},
+};
+
+/// The cells that a scan's points fall into, seen from a window's first cell. 8·N bytes.
+#[derive(Debug, Clone)]
+pub(crate) struct Rotated<const N: usize> {
+    /// Cell of each point.
+    cells: heapless::Vec<(i16, i16), N>,
+    /// Their indices in one level's table, those first that stay on it in the whole window.
+    indices: heapless::Vec<u32, N>,
+    /// Points that stay on the table of the current level.
+    inside: usize,
+    level: usize,
+    /// Cells of the window.
+    side: i16,
+}
+
+impl<const N: usize> Rotated<N> {
+    pub const fn new() -> Self {
+        Self {
+            cells: heapless::Vec::new(),
+            indices: heapless::Vec::new(),
+            inside: 0,
+            level: usize::MAX,
+            side: 0,
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Takes at most N points, evenly spread; false where the pose is out of reach.
+    pub fn assign(
+        &mut self,
+        pyramid: &Pyramid<'_>,
+        points: &[ScanPoint],
+        corner: Pose,
+        side: i16,
+    ) -> bool {
+        self.cells.clear();
+        self.level = usize::MAX;
+        self.side = side;
+        let Some(placement) = Placement::new(pyramid.field().shape(), corner) else {
+            return false;
+        };
+        for point in points.iter().step_by(stride(points.len(), N)) {
+            let (x, y) = placement.place(point);
+            // Coordinates are modulo 2³²; what is left of zero is far right until the shift keeps its sign.
+            let cell = |place: u32| {
+                let cell = place >> (placement.shift & 31);
+                let limit = 1u32 << ((31 - placement.shift) & 31);
+                if cell >= limit + limit / 2 {
+                    cell as i32 - 2 * limit as i32
+                } else {
+                    cell as i32
+                }
+            };
+            let _ = self.cells.push((
+                cell(x).clamp(-16_000, 16_383) as i16,
+                cell(y).clamp(-16_000, 16_383) as i16,
+            ));
+        }
+        true
+    }
+
+    /// Indices for a level; points that leave its table somewhere in the window go to the end.
+    fn index(&mut self, pyramid: &Pyramid<'_>, level: usize) {
+        let table = pyramid.level(level);
+        let shift = 2 * level as u32;
+        let span = i32::from(self.side) >> shift;
+        self.indices.clear();
+        self.inside = 0;
+        self.level = level;
+        for k in 0..self.cells.len() {
+            let Some(&(x, y)) = self.cells.get(k) else {
+                break;
+            };
+            let (column, row) = (
+                (i32::from(x) >> shift) + table.before,
+                (i32::from(y) >> shift) + table.before,
+            );
+            // Four at a time: a row may read three entries past the window.
+            let on = column >= 0
+                && row >= 0
+                && column + span + 3 < table.width
+                && row + span < table.height;
+            let _ = self
+                .indices
+                .push((row.wrapping_mul(table.width).wrapping_add(column)) as u32);
+            if on {
+                // Keep both lists in the same order.
+                self.indices.swap(k, self.inside);
+                self.cells.swap(k, self.inside);
+                self.inside += 1;
+            }
+        }
+    }
+
+    /// Sums of bytes at four places in a row: `x..x + 4` and `y` in blocks of the level, from the window's first.
+    pub fn row(&mut self, pyramid: &Pyramid<'_>, level: usize, x: i16, y: i16) -> [u32; 4] {
+        if level != self.level {
+            self.index(pyramid, level);
+        }
+        let table = pyramid.level(level);
+        let offset = i32::from(y)
+            .wrapping_mul(table.width)
+            .wrapping_add(i32::from(x)) as usize;
+        let (inside, _) = self
+            .indices
+            .split_at_checked(self.inside)
+            .unwrap_or((&[], &[]));
+        let mut sums = sum_four(table.cells.get(offset..).unwrap_or(&[]), inside);
+        let shift = 2 * level as u32;
+        let unexplored = u32::from(pyramid.field().scale().unexplored);
+        for &(cx, cy) in self.cells.iter().skip(self.inside) {
+            let column = (i32::from(cx) >> shift) + table.before + i32::from(x);
+            let row = (i32::from(cy) >> shift) + table.before + i32::from(y);
+            for (sum, column) in sums.iter_mut().zip(column..) {
+                let on = (0..table.width).contains(&column) && (0..table.height).contains(&row);
+                let index = (row.wrapping_mul(table.width)).wrapping_add(column) as usize;
+                *sum += match table.cells.get(index) {
+                    Some(&byte) if on => u32::from(byte),
+                    _ => unexplored,
+                };
+            }
+        }
+        sums
+    }
+}
+
+/// Sums of four bytes in a row from each index on: two additions for four places.
+pub(crate) fn sum_four(table: &[u8], indices: &[u32]) -> [u32; 4] {
+    let mut sums = [0u32; 4];
+    // 256 bytes of 255 fit in 16 bits.
+    for indices in indices.chunks(256) {
+        let (mut even, mut odd) = (0u32, 0u32);
+        for &index in indices {
+            if let Some(bytes) = table
+                .get(index as usize..)
+                .and_then(|rest| rest.first_chunk::<4>())
+            {
+                let word = u32::from_le_bytes(*bytes);
+                even = even.wrapping_add(word & 0x00ff_00ff);
+                odd = odd.wrapping_add((word >> 8) & 0x00ff_00ff);
+            }
+        }
+        for (sum, part) in sums
+            .iter_mut()
+            .zip([even & 0xffff, odd & 0xffff, even >> 16, odd >> 16])
+        {
+            *sum += part;
+        }
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn four_sums_at_once() {
+        let table: [u8; 8] = [1, 2, 3, 4, 5, 255, 255, 255];
+        assert_eq!(
+            sum_four(&table, &[0, 1, 4]),
+            [1 + 2 + 5, 2 + 3 + 255, 3 + 4 + 255, 4 + 5 + 255]
+        );
+        assert_eq!(sum_four(&table, &[4; 300]), [1500, 76_500, 76_500, 76_500]);
+        assert_eq!(sum_four(&table, &[5]), [0; 4]);
+    }
+}
