@@ -5,9 +5,12 @@
 //! ```
 //!
 //! One file a protocol family, each with a `Parser` that implements [`Protocol`] and a `Packet` that implements
-//! [`Packet`]. Parsers do no I/O; `io`, behind the features `embedded-io`, `embedded-io-async` and `embedded-hal-nb`,
-//! connects them to a UART.
+//! [`Packet`]. A [`Model`] is a row of data on a family. Parsers do no I/O; `io`, behind the features `embedded-io`,
+//! `embedded-io-async` and `embedded-hal-nb`, connects them to a UART.
 
+pub mod camsense;
+pub mod coin_d4;
+pub mod delta;
 pub mod framing;
 #[cfg(any(
     feature = "embedded-io",
@@ -16,10 +19,21 @@ pub mod framing;
 ))]
 pub mod io;
 pub mod ld06;
-
-use crate::scan::Beam;
+pub mod lds01;
+pub mod model;
+pub mod packet;
+pub mod parser;
+pub mod rplidar;
+pub mod scip;
+pub mod sick;
+pub mod timing;
+pub mod xv11;
+pub mod ydlidar;
 
 pub use framing::{Framer, Verdict};
+pub use model::{Family, Model};
+pub use packet::{Packet, Reading, Sample, View};
+pub use parser::{Format, Parser};
 
 /// A lidar's serial protocol as a push parser.
 ///
@@ -37,6 +51,11 @@ pub trait Protocol {
     /// [`Protocol::push`] gives one of them.
     fn pull(&mut self) -> Option<Self::Packet>;
 
+    /// Says when (µs) the bytes pushed next came in.
+    ///
+    /// Times of sensors without a clock are counted back from there. Without it they run at the sensor's nominal pace.
+    fn arrived(&mut self, now_us: u32);
+
     /// Bytes held of a frame that is not complete yet.
     fn pending_bytes(&self) -> usize;
 
@@ -44,36 +63,14 @@ pub trait Protocol {
     fn counters(&self) -> Counters;
 }
 
-/// The measurements of one packet.
-pub trait Packet {
-    /// In the order of measurement; angles counter-clockwise, times in the parser's clock.
-    fn beams(&self) -> impl Iterator<Item = Beam> + '_;
-
-    /// As the sensor itself gives them, in the same order.
-    fn samples(&self) -> impl Iterator<Item = Sample> + '_;
-
-    /// Number of the beam that is the first of a new turn, if one is among them.
-    fn turn_start(&self) -> Option<usize>;
-}
-
-/// One measurement in the sensor's own terms: for decoding and comparison, not for matching.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Sample {
-    /// In the sensor's own sense, after its maker's corrections, in `[0, 360)` (degrees).
-    pub angle_deg: f32,
-    /// Distance (mm), if there is one.
-    pub range_mm: Option<f32>,
-    /// Strength of the return in the sensor's own unit, 0 where it gives none.
-    pub quality: u16,
-}
-
 /// What a parser has seen since its start; every number wraps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters {
-    /// Frames that passed every check.
+    /// Frames with measurements that passed every check.
     pub packets: u32,
+    /// Other good frames: answers to commands, time frames.
+    pub answers: u32,
     /// Complete frames that failed their check code.
     pub check_errors: u32,
     /// Bytes that belong to no accepted frame.

@@ -2,11 +2,16 @@
 
 use std::fmt;
 
-use beamfix::lidar::{Counters, Packet, Protocol, Sample, ld06};
+use beamfix::lidar::{
+    Counters, Family, Model, Packet, Protocol, camsense, coin_d4, delta, ld06, lds01, rplidar,
+    scip, sick, xv11, ydlidar,
+};
 use beamfix::scan::Beam;
 
-/// Sensors that [`decode`] knows, by the names that the tool takes.
-pub const NAMES: &[&str] = &["ld06"];
+/// Names that [`decode`] knows.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    Model::ALL.iter().map(|model| model.name)
+}
 
 /// One measurement of a decoded stream: as the sensor itself gives it, and as the library's beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,11 +56,43 @@ pub struct UnknownLidar(pub String);
 impl fmt::Display for UnknownLidar {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Self(name) = self;
-        write!(f, "unknown lidar '{name}'; known: {}", NAMES.join(" "))
+        let known: Vec<&str> = names().collect();
+        write!(f, "unknown lidar '{name}'; known: {}", known.join(" "))
     }
 }
 
 impl std::error::Error for UnknownLidar {}
+
+/// What to do with a parser, whichever it is.
+pub trait WithParser {
+    /// What comes of it.
+    type Output;
+
+    /// Does it with a parser of `model`'s family.
+    fn run<P: Protocol>(self, parser: P) -> Self::Output;
+}
+
+/// Does something with the parser of `model`.
+pub fn with_parser<W: WithParser>(model: &Model, with: W) -> W::Output {
+    match model.family {
+        Family::RplidarScan => with.run(rplidar::Parser::for_model(model)),
+        Family::RplidarExpress => with.run(rplidar::capsule::Parser::express(model)),
+        Family::RplidarDense => with.run(rplidar::capsule::Parser::dense(model)),
+        Family::RplidarUltra => with.run(rplidar::ultra::UltraParser::for_model(model)),
+        Family::RplidarUltraDense => with.run(rplidar::ultra::UltraDenseParser::for_model(model)),
+        Family::RplidarHq => with.run(rplidar::hq::Parser::for_model(model)),
+        Family::Ydlidar(_) => with.run(ydlidar::Parser::for_model(model)),
+        Family::Lds01 => with.run(lds01::Parser::for_model(model)),
+        Family::Xv11 => with.run(xv11::Parser::for_model(model)),
+        Family::Xv11Early => with.run(xv11::early::Parser::for_model(model)),
+        Family::Delta(_) => with.run(delta::Parser::for_model(model)),
+        Family::Camsense => with.run(camsense::Parser::for_model(model)),
+        Family::CoinD4 => with.run(coin_d4::Parser::for_model(model)),
+        Family::Scip(_) => with.run(scip::Parser::for_model(model)),
+        Family::Sick => with.run(sick::Parser::for_model(model)),
+        _ => with.run(ld06::Parser::for_model(model)),
+    }
+}
 
 /// Decodes `bytes` of the sensor called `name`; each measurement goes to `sink` in order.
 pub fn decode(
@@ -63,55 +100,69 @@ pub fn decode(
     bytes: &[u8],
     sink: &mut dyn FnMut(Row),
 ) -> Result<Summary, UnknownLidar> {
-    match name {
-        "ld06" => Ok(run(ld06::Parser::new(), bytes, sink)),
-        _ => Err(UnknownLidar(name.into())),
+    let model = Model::named(name).ok_or_else(|| UnknownLidar(name.into()))?;
+    // A scanner that does not see all around counts to both sides.
+    let is_signed = matches!(model.family, Family::Scip(_));
+    let decoding = Decoding {
+        bytes,
+        is_signed,
+        sink,
+    };
+    Ok(with_parser(model, decoding))
+}
+
+/// One stream to decode.
+struct Decoding<'a> {
+    bytes: &'a [u8],
+    is_signed: bool,
+    sink: &'a mut dyn FnMut(Row),
+}
+
+impl WithParser for Decoding<'_> {
+    type Output = Summary;
+
+    fn run<P: Protocol>(self, mut parser: P) -> Summary {
+        let mut summary = Summary::default();
+        for &byte in self.bytes {
+            if let Some(packet) = parser.push(byte) {
+                summary.take(&packet, self.is_signed, self.sink);
+            }
+        }
+        while let Some(packet) = parser.pull() {
+            summary.take(&packet, self.is_signed, self.sink);
+        }
+        let Counters {
+            packets,
+            check_errors,
+            skipped_bytes,
+            ..
+        } = parser.counters();
+        Summary {
+            packets,
+            check_errors,
+            skipped_bytes,
+            tail_bytes: parser.pending_bytes() as u32,
+            ..summary
+        }
     }
 }
 
-/// Drives one parser over the stream.
-fn run<P: Protocol>(mut parser: P, bytes: &[u8], sink: &mut dyn FnMut(Row)) -> Summary {
-    let mut summary = Summary::default();
-    let mut take = |packet: P::Packet| {
+impl Summary {
+    fn take(&mut self, packet: &impl Packet, is_signed: bool, sink: &mut dyn FnMut(Row)) {
         for (k, (sample, beam)) in packet.samples().zip(packet.beams()).enumerate() {
             let turn_starts = packet.turn_start() == Some(k);
-            summary.scans += u32::from(turn_starts);
-            summary.points += 1;
-            let Sample {
-                angle_deg,
-                range_mm,
-                quality,
-            } = sample;
+            self.scans += u32::from(turn_starts);
+            self.points += 1;
+            let turned = is_signed && sample.angle_deg >= 180.0;
             sink(Row {
-                scan: summary.scans,
+                scan: self.scans,
                 time_us: beam.time_us,
-                angle_deg,
-                range_mm,
-                quality,
+                angle_deg: sample.angle_deg - if turned { 360.0 } else { 0.0 },
+                range_mm: sample.range_mm,
+                quality: sample.quality,
                 beam,
                 turn_starts,
             });
         }
-    };
-    for &byte in bytes {
-        if let Some(packet) = parser.push(byte) {
-            take(packet);
-        }
-    }
-    while let Some(packet) = parser.pull() {
-        take(packet);
-    }
-    let Counters {
-        packets,
-        check_errors,
-        skipped_bytes,
-        ..
-    } = parser.counters();
-    Summary {
-        packets,
-        check_errors,
-        skipped_bytes,
-        tail_bytes: parser.pending_bytes() as u32,
-        ..summary
     }
 }

@@ -18,6 +18,17 @@ pub enum Verdict {
     CheckFailed,
     /// A frame of so many bytes that passes every check.
     Frame(usize),
+    /// Another good frame, without measurements: not skipped, not given.
+    Answer(usize),
+}
+
+/// A frame that passed every check.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frame<'a> {
+    /// All its bytes.
+    pub bytes: &'a [u8],
+    /// Bytes skipped since the start of the stream.
+    pub skipped_bytes: u32,
 }
 
 /// Buffer of the longest frame and a window that slides over the stream.
@@ -50,6 +61,7 @@ impl<const L: usize> Framer<L> {
                 check_errors: 0,
                 skipped_bytes: 0,
                 turns: 0,
+                answers: 0,
             },
         }
     }
@@ -57,7 +69,7 @@ impl<const L: usize> Framer<L> {
     /// Takes a byte; gives the frame that it completes.
     ///
     /// `judge` looks at bytes that may begin a frame; it gets at least as many as it last said it needs.
-    pub fn push(&mut self, byte: u8, judge: impl FnMut(&[u8]) -> Verdict) -> Option<&[u8]> {
+    pub fn push(&mut self, byte: u8, judge: impl FnMut(&[u8]) -> Verdict) -> Option<Frame<'_>> {
         if self.taken != 0 {
             self.drop_front(self.taken);
         }
@@ -72,7 +84,7 @@ impl<const L: usize> Framer<L> {
     }
 
     /// Gives a further frame that is complete among the bytes held.
-    pub fn pull(&mut self, judge: impl FnMut(&[u8]) -> Verdict) -> Option<&[u8]> {
+    pub fn pull(&mut self, judge: impl FnMut(&[u8]) -> Verdict) -> Option<Frame<'_>> {
         self.drop_front(self.taken);
         if self.len < self.needed {
             return None;
@@ -92,50 +104,48 @@ impl<const L: usize> Framer<L> {
         self.counters
     }
 
-    /// Counts a turn where one begins in the frame just given.
-    pub fn count_turns(&mut self, begins: bool) {
-        self.counters.turns = self.counters.turns.wrapping_add(u32::from(begins));
-    }
-
-    fn examine(&mut self, mut judge: impl FnMut(&[u8]) -> Verdict) -> Option<&[u8]> {
+    fn examine(&mut self, mut judge: impl FnMut(&[u8]) -> Verdict) -> Option<Frame<'_>> {
         let mut start = 0;
-        let frame = loop {
+        let length = loop {
             let rest = self.buffer.get(start..self.len).unwrap_or(&[]);
             if rest.is_empty() {
-                self.needed = 1;
-                break 0;
+                self.drop_front(start);
+                return None;
             }
             match judge(rest) {
                 Verdict::Frame(length) if length != 0 && length <= rest.len() => break length,
-                Verdict::Need(length) if length > rest.len() && length <= L => {
-                    self.needed = length;
-                    break 0;
+                Verdict::Need(needed) if needed > rest.len() && needed <= L => {
+                    self.drop_front(start);
+                    self.needed = needed;
+                    return None;
+                }
+                Verdict::Answer(length) if length != 0 && length <= rest.len() => {
+                    self.counters.answers = self.counters.answers.wrapping_add(1);
+                    start += length;
+                    continue;
                 }
                 Verdict::CheckFailed => {
                     self.counters.check_errors = self.counters.check_errors.wrapping_add(1);
                 }
                 _ => {}
             }
+            self.counters.skipped_bytes = self.counters.skipped_bytes.wrapping_add(1);
             start += 1;
         };
-        self.counters.skipped_bytes = self.counters.skipped_bytes.wrapping_add(start as u32);
-        if frame == 0 {
-            let needed = self.needed;
-            self.drop_front(start);
-            self.needed = needed;
-            return None;
-        }
         self.counters.packets = self.counters.packets.wrapping_add(1);
-        self.taken = start + frame;
-        self.buffer.get(start..self.taken)
+        self.taken = start + length;
+        Some(Frame {
+            bytes: self.buffer.get(start..self.taken)?,
+            skipped_bytes: self.counters.skipped_bytes,
+        })
     }
 
     fn drop_front(&mut self, count: usize) {
         self.taken = 0;
+        self.needed = 1;
         if count == 0 {
             return;
         }
-        self.needed = 1;
         // The length is never more than L; said in a way that leaves no panic to be proven unreachable.
         match self.buffer.get_mut(..self.len) {
             Some(held) if count < held.len() => {
@@ -204,12 +214,30 @@ mod tests {
     }
 
     #[test]
+    fn answers_are_neither_given_nor_skipped() {
+        let judge = |bytes: &[u8]| match *bytes {
+            [9] => Verdict::Need(2),
+            [9, _, ..] => Verdict::Answer(2),
+            _ => judge(bytes),
+        };
+        let mut framer = Framer::<8>::new();
+        let given = [9, 2, 2, 3, 5, 9, 9, 2].map(|byte| framer.push(byte, judge).is_some());
+        assert_eq!(given.iter().filter(|&&given| given).count(), 1);
+        let counters = framer.counters();
+        assert_eq!((counters.answers, counters.skipped_bytes), (2, 0));
+        assert_eq!(framer.pending_bytes(), 1);
+    }
+
+    #[test]
     fn a_frame_longer_than_the_buffer_is_refused() {
         let mut framer = Framer::<4>::new();
         for byte in [2, 5, 2, 3] {
             assert_eq!(framer.push(byte, judge), None);
         }
-        assert_eq!(framer.push(5, judge), Some(&[2, 3, 5][..]));
+        assert_eq!(
+            framer.push(5, judge).map(|frame| frame.bytes),
+            Some(&[2, 3, 5][..])
+        );
         assert_eq!(framer.counters().skipped_bytes, 2);
     }
 }

@@ -56,6 +56,11 @@ impl<S, P: Protocol> Reader<S, P> {
         &self.parser
     }
 
+    /// The parser, for instance to tell it when the next bytes arrived.
+    pub fn parser_mut(&mut self) -> &mut P {
+        &mut self.parser
+    }
+
     /// The UART, for instance to send a command.
     pub fn serial(&mut self) -> &mut S {
         &mut self.serial

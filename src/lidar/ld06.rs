@@ -15,8 +15,10 @@
 
 use crc::{Algorithm, Crc};
 
-use super::{Counters, Framer, Protocol, Sample, Verdict};
-use crate::scan::{Beam, Bearing, Range};
+use super::packet::{Turns, from_cdeg};
+use super::timing::{Pace, Stamps};
+use super::{Family, Model, Reading, Verdict, View};
+use crate::math::{atan2_turn, isqrt};
 
 /// Bytes of a frame.
 pub const FRAME: usize = 47;
@@ -41,53 +43,20 @@ pub fn check_code(bytes: &[u8]) -> u8 {
     CRC.checksum(bytes)
 }
 
-/// Push parser of the 47-byte frame. About 130 bytes.
-#[derive(Debug, Clone)]
-pub struct Parser {
-    framer: Framer<FRAME>,
-    clock: Clock,
-    /// Angle of the last point seen (0.01°).
-    previous_cdeg: u16,
-}
+/// Push parser of the 47-byte frame. 200 bytes.
+pub type Parser = super::Parser<Format, FRAME>;
 
 impl Parser {
-    /// LD06, LD19, STL-06P: 4500 points per second.
+    /// LD06, LD19.
     #[must_use]
     pub const fn new() -> Self {
-        Self::with_sample_rate(4500)
+        Self::for_model(&Model::LD06)
     }
 
-    /// A relative with another number of points per second; 0 is taken as 1.
-    ///
-    /// STL-19P, STL-26: 5000. STL-27L: 21 600. LD14, LDS-02: 2300. LD14P: 4000.
+    /// Any of the family.
     #[must_use]
-    pub const fn with_sample_rate(points_per_s: u32) -> Self {
-        Self {
-            framer: Framer::new(),
-            clock: Clock::new(points_per_s),
-            previous_cdeg: 0,
-        }
-    }
-
-    fn packet(frame: &[u8], clock: &mut Clock, previous_cdeg: &mut u16) -> Option<Packet> {
-        let frame: &[u8; FRAME] = frame.try_into().ok()?;
-        let &[_, _, v0, v1, a0, a1, ref points @ .., b0, b1, t0, t1, _] = frame;
-        let start_cdeg = u16::from_le_bytes([a0, a1]) % 36_000;
-        let end_cdeg = u16::from_le_bytes([b0, b1]) % 36_000;
-        let stamp_ms = u16::from_le_bytes([t0, t1]);
-        let mut packet = Packet {
-            speed_deg_per_s: u16::from_le_bytes([v0, v1]),
-            start_cdeg,
-            end_cdeg,
-            stamp_ms,
-            time_us: clock.time_us(stamp_ms),
-            period_q8: clock.period_q8,
-            turn_start: None,
-            points: *points,
-        };
-        packet.turn_start = packet.find_turn_start(*previous_cdeg);
-        *previous_cdeg = end_cdeg;
-        Some(packet)
+    pub const fn for_model(model: &Model) -> Self {
+        Self::with_format(Format::new(model), model.baud)
     }
 }
 
@@ -97,33 +66,87 @@ impl Default for Parser {
     }
 }
 
-impl Protocol for Parser {
-    type Packet = Packet;
+/// How the receiver's distance from the laser is corrected for: by the maker's formulas.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Parallax {
+    /// Not at all, or in the sensor: LD06, LD19, STL.
+    None,
+    /// LD14, LD14P: the angle is corrected; a point without a range gets the shift of the one before.
+    Ld14,
+    /// LDS-02: angle and range are corrected.
+    Lds02,
+}
 
-    fn push(&mut self, byte: u8) -> Option<Packet> {
-        let frame = self.framer.push(byte, judge)?;
-        let packet = Self::packet(frame, &mut self.clock, &mut self.previous_cdeg)?;
-        self.framer.count_turns(packet.turn_start.is_some());
-        Some(packet)
-    }
+/// State of the family's parser.
+#[derive(Debug, Clone)]
+pub struct Format {
+    parallax: Parallax,
+    base: View,
+    stamps: Stamps,
+    turns: Turns,
+    /// Shift of the last point that had one.
+    shift: u32,
+}
 
-    fn pull(&mut self) -> Option<Packet> {
-        let frame = self.framer.pull(judge)?;
-        let packet = Self::packet(frame, &mut self.clock, &mut self.previous_cdeg)?;
-        self.framer.count_turns(packet.turn_start.is_some());
-        Some(packet)
-    }
-
-    fn pending_bytes(&self) -> usize {
-        self.framer.pending_bytes()
-    }
-
-    fn counters(&self) -> Counters {
-        self.framer.counters()
+impl Format {
+    const fn new(model: &Model) -> Self {
+        Self {
+            parallax: match model.family {
+                Family::Ldrobot(parallax) => parallax,
+                _ => Parallax::None,
+            },
+            base: View::of(model, 0),
+            stamps: Stamps::new(STAMP_WRAP_MS, POINTS as u8, model.period_q8()),
+            turns: Turns::new(),
+            shift: 0,
+        }
     }
 }
 
-fn judge(bytes: &[u8]) -> Verdict {
+impl super::Format for Format {
+    type Packet = Packet;
+
+    fn judge(&self, bytes: &[u8]) -> Verdict {
+        judge(bytes)
+    }
+
+    fn packet(&mut self, frame: &[u8], _: bool, _: &mut Pace) -> Option<Packet> {
+        let frame: &[u8; FRAME] = frame.try_into().ok()?;
+        let &[_, _, v0, v1, a0, a1, ref points @ .., b0, b1, t0, t1, _] = frame;
+        let start_cdeg = u16::from_le_bytes([a0, a1]);
+        let end_cdeg = u16::from_le_bytes([b0, b1]);
+        let stamp_ms = u16::from_le_bytes([t0, t1]);
+        let start = from_cdeg(start_cdeg.into());
+        let step = from_cdeg(span_cdeg(start_cdeg, end_cdeg)) / 11;
+        let first_us = self.stamps.first_us(stamp_ms);
+        let packet = Packet {
+            speed_deg_per_s: u16::from_le_bytes([v0, v1]),
+            start_cdeg,
+            end_cdeg,
+            stamp_ms,
+            view: View {
+                first_us,
+                period_q8: self.stamps.period_q8(),
+                turn_start: self.turns.find(start, step, POINTS as u16),
+                ..self.base
+            },
+            start,
+            step,
+            parallax: self.parallax,
+            shift: self.shift,
+            points: *points,
+        };
+        if self.parallax == Parallax::Ld14 {
+            let ranges = packet.points().map(|(mm, _)| mm);
+            self.shift = ranges.fold(self.shift, ld14_shift);
+        }
+        Some(packet)
+    }
+}
+
+/// LDROBOT frames among other bytes.
+pub(super) fn judge(bytes: &[u8]) -> Verdict {
     match *bytes {
         [0x54] => Verdict::Need(2),
         [0x54, 0x2c, ..] => match bytes.get(..FRAME) {
@@ -157,120 +180,28 @@ fn span_cdeg(start: u16, end: u16) -> u32 {
     (u32::from(end) + wrap).saturating_sub(u32::from(start))
 }
 
-/// The sensor's clock without its wraps, and finer than its milliseconds.
-///
-/// A stamp says which millisecond a frame's first beam was measured in, and the frames come at the steady pace of a
-/// crystal: an alpha-beta filter (1/16, about 1/1365: critically damped) learns pace and phase. Times never go back.
-#[derive(Debug, Clone)]
-struct Clock {
-    /// Time from beam to beam (µs/256).
-    period_q8: u32,
-    /// The same by the data sheet.
-    nominal_q8: u32,
-    stamp_ms: Option<u16>,
-    /// Middle of the stamp's millisecond.
-    stamp_us: u32,
-    time_us: u32,
-    fraction_q8: u32,
-}
-
-impl Clock {
-    const fn new(points_per_s: u32) -> Self {
-        let rate = if points_per_s < 100 {
-            100
-        } else {
-            points_per_s
-        };
-        Self {
-            period_q8: 256_000_000 / rate,
-            nominal_q8: 256_000_000 / rate,
-            stamp_ms: None,
-            stamp_us: 0,
-            time_us: 0,
-            fraction_q8: 0,
-        }
-    }
-
-    /// Time of the first beam of the frame that has this stamp.
-    ///
-    /// Of a gap longer than 30 s only the remainder is seen.
-    fn time_us(&mut self, stamp_ms: u16) -> u32 {
-        /// Stamp and pace differ by more only where frames are missing (µs).
-        const GAP: i32 = 1500;
-
-        let Some(previous) = self.stamp_ms.replace(stamp_ms) else {
-            self.stamp_us = u32::from(stamp_ms) * 1000 + 500;
-            self.time_us = self.stamp_us;
-            return self.time_us;
-        };
-        let wrap = if stamp_ms < previous {
-            STAMP_WRAP_MS
-        } else {
-            0
-        };
-        let elapsed_ms = (u32::from(stamp_ms) + u32::from(wrap)).saturating_sub(previous.into());
-        self.stamp_us = self.stamp_us.wrapping_add(elapsed_ms * 1000);
-
-        let steady_q8 = self.fraction_q8 + POINTS as u32 * self.period_q8;
-        self.fraction_q8 = steady_q8 & 0xff;
-        let steady_us = self.time_us.wrapping_add(steady_q8 >> 8);
-        let late = self.stamp_us.wrapping_sub(steady_us) as i32;
-        if late > GAP {
-            self.time_us = self.stamp_us;
-            return self.time_us;
-        }
-        let late = late.max(-GAP);
-        let quarter = self.nominal_q8 / 4;
-        self.period_q8 = self
-            .period_q8
-            .saturating_add_signed(late >> 6)
-            // Not `clamp`, which panics where its limits are the wrong way round.
-            .max(self.nominal_q8 - quarter)
-            .min(self.nominal_q8 + quarter);
-        // Half a beam at most: the first beam of a frame stays behind the last of the one before.
-        let back = -((self.period_q8 >> 9) as i32);
-        self.time_us = steady_us.wrapping_add_signed((late >> 4).max(back));
-        self.time_us
-    }
-}
-
 /// Twelve points of an LDROBOT sensor.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet {
     /// Speed of the motor (deg/s).
     pub speed_deg_per_s: u16,
-    /// Angle of the first point, clockwise from the front mark, 0…35 999 (0.01°).
+    /// Angle of the first point, clockwise from the front mark (0.01°).
     pub start_cdeg: u16,
     /// Angle of the last point (0.01°).
     pub end_cdeg: u16,
-    /// The sensor's clock at the first point, 0…29 999 (ms).
+    /// The sensor's clock at the first point, 0…30 000 (ms).
     pub stamp_ms: u16,
-    /// The same without its wraps, and finer: time of the first point (µs, wrapping at 2³²).
-    pub time_us: u32,
-    period_q8: u32,
-    turn_start: Option<u8>,
+    view: View,
+    start: u32,
+    step: u32,
+    parallax: Parallax,
+    shift: u32,
     points: [u8; 3 * POINTS],
 }
 
 impl Packet {
-    fn span_cdeg(&self) -> u32 {
-        span_cdeg(self.start_cdeg, self.end_cdeg)
-    }
-
-    /// Number of the point at which the angle falls from nearly a turn to nearly nothing.
-    fn find_turn_start(&self, previous_cdeg: u16) -> Option<u8> {
-        if previous_cdeg > self.start_cdeg && previous_cdeg - self.start_cdeg > 18_000 {
-            return Some(0);
-        }
-        if self.end_cdeg >= self.start_cdeg {
-            return None;
-        }
-        let to_turn = 11 * (36_000 - u32::from(self.start_cdeg));
-        let span = self.span_cdeg();
-        (1..POINTS as u8).find(|&k| u32::from(k) * span >= to_turn)
-    }
-
+    /// Range (mm) and intensity as sent.
     fn points(&self) -> impl ExactSizeIterator<Item = (u16, u8)> + '_ {
         self.points.chunks_exact(3).map(|point| match *point {
             [low, high, intensity] => (u16::from_le_bytes([low, high]), intensity),
@@ -280,47 +211,67 @@ impl Packet {
 }
 
 impl super::Packet for Packet {
-    fn beams(&self) -> impl Iterator<Item = Beam> + '_ {
-        // A turn is 2³² here, so that an angle is a product, a step a sum, and wrapping comes by itself.
-        const TURN_PER_CDEG: u32 = 119_305;
-        let mut clockwise = u32::from(self.start_cdeg).wrapping_mul(TURN_PER_CDEG);
-        let step = self.span_cdeg() * TURN_PER_CDEG / 11;
-        let mut age_q8 = 0u32;
+    fn view(&self) -> &View {
+        &self.view
+    }
+
+    fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
+        let mut angle = self.start;
+        let mut shift = self.shift;
         self.points().map(move |(mm, intensity)| {
-            let beam = Beam {
-                bearing: Bearing((clockwise.wrapping_neg().wrapping_add(0x8000) >> 16) as u16),
-                range: Range::from_mm(u32::from(mm)),
-                time_us: self.time_us.wrapping_add(age_q8 >> 8),
-                quality: intensity,
+            let (turned, quarters) = match self.parallax {
+                Parallax::None => (0, u32::from(mm) << 2),
+                Parallax::Ld14 => {
+                    shift = ld14_shift(shift, mm);
+                    (shift, u32::from(mm) << 2)
+                }
+                Parallax::Lds02 => lds02_parallax(mm),
             };
-            clockwise = clockwise.wrapping_add(step);
-            age_q8 = age_q8.wrapping_add(self.period_q8);
-            beam
-        })
-    }
-
-    fn samples(&self) -> impl Iterator<Item = Sample> + '_ {
-        let start = 11 * u32::from(self.start_cdeg);
-        let span = self.span_cdeg();
-        self.points().zip(0..).map(move |((mm, intensity), k)| {
-            let angle = (start + k * span) % (11 * 36_000);
-            Sample {
-                angle_deg: angle as f32 / 1100.0,
-                range_mm: (mm != 0).then_some(f32::from(mm)),
+            let reading = Reading {
+                angle: angle.wrapping_sub(turned),
+                range: Reading::range_q2(quarters),
                 quality: u16::from(intensity),
-            }
+            };
+            angle = angle.wrapping_add(self.step);
+            reading
         })
     }
+}
 
-    fn turn_start(&self) -> Option<usize> {
-        self.turn_start.map(usize::from)
+/// `atan((0.11923 d - 18.975571) / (d + 5.9))`, d in mm, as a fraction of a turn; without a range the `previous` one.
+fn ld14_shift(previous: u32, mm: u16) -> u32 {
+    if mm == 0 {
+        return previous;
     }
+    // Both sides times 4096: 488.366 and 77 723.9 and 24 166.4.
+    let d = i32::from(mm);
+    let y = d * 488 + ((d * 3) >> 3) - 77_724;
+    u32::from(atan2_turn(y, d * 4096 + 24_166)) << 16
+}
+
+/// Shift of the angle, and the range from the middle of the sensor (mm/4).
+fn lds02_parallax(mm: u16) -> (u32, u32) {
+    if mm == 0 {
+        return (0, 0);
+    }
+    // x = d + 5.9, y = 0.11923 d - 20.14, in mm/1024.
+    let d = i32::from(mm);
+    let x = d * 1024 + 6042;
+    let y = d * 122 + ((d * 3) >> 5) - 20_623;
+    let shift = u32::from(atan2_turn(y, x)) << 16;
+    // Squares of eighths of a millimetre fit up to 8.1 m, which is as far as the sensor sees.
+    let half = |n: i32| (n.unsigned_abs() + 64) >> 7;
+    let sum = half(x)
+        .saturating_mul(half(x))
+        .saturating_add(half(y).saturating_mul(half(y)));
+    (shift, (isqrt(sum) + 1) >> 1)
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::lidar::Packet as _;
+    use crate::lidar::{Packet as _, Protocol};
+    use crate::scan::Bearing;
 
     /// The example frame of the LD06 manual.
     pub(in crate::lidar) const MANUAL: [u8; FRAME] = [
@@ -357,49 +308,5 @@ pub(super) mod tests {
         let counters = parser.counters();
         assert_eq!((counters.packets, counters.check_errors), (1, 1));
         assert_eq!((counters.skipped_bytes, parser.pending_bytes()), (30, 0));
-    }
-
-    #[test]
-    fn bearings_agree_with_samples_around_the_whole_turn() {
-        for start_cdeg in (0..36_000).step_by(7) {
-            let end_cdeg = (start_cdeg + 881) % 36_000;
-            let packet = Packet {
-                speed_deg_per_s: 3600,
-                start_cdeg,
-                end_cdeg,
-                stamp_ms: 0,
-                time_us: 0,
-                period_q8: 0,
-                turn_start: None,
-                points: [0; 36],
-            };
-            for (beam, sample) in packet.beams().zip(packet.samples()) {
-                let native = 360.0 - f32::from(beam.bearing.0) * (360.0 / 65536.0);
-                let off = (native - sample.angle_deg + 540.0) % 360.0 - 180.0;
-                // Half a unit of bearing, 0.0028°, and what a turn of 36 000 · 119 305 is longer than 2³².
-                assert!(off.abs() < 0.004, "{start_cdeg}: {beam:?} {sample:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn time_goes_on_over_the_stamps_wrap_and_through_gaps() {
-        // Sensors that are faster and slower than their data sheet; ten frames are missing in the middle.
-        for frame_us in [2666.67, 2600.0, 2410.0, 2800.0] {
-            let mut clock = Clock::new(4500);
-            let mut last = 0u32;
-            for k in (0..2000u32).chain(2010..40_000) {
-                let truth_us = 29_000_000 + (f64::from(k) * frame_us) as u32;
-                let time = clock.time_us((truth_us / 1000 % 30_000) as u16);
-                let off = time.abs_diff(truth_us);
-                let allowed = if k < 1500 { 20_000 } else { 800 };
-                assert!(off < allowed, "{frame_us} {k}: {time} {truth_us}");
-                let beams_us = 11 * clock.period_q8 / 256;
-                assert!(k == 0 || time > last + beams_us, "{frame_us} {k}");
-                last = time;
-            }
-            // Without gaps the milliseconds average out.
-            assert!(last.abs_diff(29_000_000 + (39_999.0 * frame_us) as u32) < 150);
-        }
     }
 }

@@ -1,0 +1,178 @@
+//! Camsense X1 and LDS08RR: frames of 8 or 12 points.
+//!
+//! Source: open drivers; checked against recordings. The motor runs freely.
+//!
+//! | offset | field | unit |
+//! | --- | --- | --- |
+//! | 0 | `0x55 0xAA` | sync |
+//! | 2 | kind: 2, 3, 7 | bytes of a point: 2, 3, 4 |
+//! | 3 | number of points n | |
+//! | 4 | speed | rpm/64, `u16` LE |
+//! | 6 | angle of the first point + `0xA000` | 1/64° clockwise, `u16` LE |
+//! | 8 | n points: distance as on the XV-11; quality of 0, 1 or 2 bytes | mm, `u16` LE |
+//! | … | angle of the last point + `0xA000` | 1/64° clockwise, `u16` LE |
+//! | … | check code, as on the XV-11 | `u16` LE |
+
+use super::packet::{Turns, divided, from_deg_q6};
+use super::timing::Pace;
+use super::{Model, Reading, Verdict, View, xv11};
+
+/// Most points of a frame.
+pub const MOST_POINTS: usize = 40;
+/// Bytes of the longest frame.
+pub const FRAME: usize = 12 + 4 * MOST_POINTS;
+
+/// Push parser. About 280 bytes.
+pub type Parser = super::Parser<Format, FRAME>;
+
+impl Parser {
+    /// Any of the family.
+    #[must_use]
+    pub const fn for_model(model: &Model) -> Self {
+        let format = Format {
+            base: View::of(model, 0),
+            turns: Turns::new(),
+        };
+        Self::with_format(format, model.baud)
+    }
+}
+
+/// State of the parser.
+#[derive(Debug, Clone)]
+pub struct Format {
+    base: View,
+    turns: Turns,
+}
+
+impl super::Format for Format {
+    type Packet = Packet;
+
+    fn judge(&self, bytes: &[u8]) -> Verdict {
+        judge(bytes)
+    }
+
+    fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {
+        let &[
+            _,
+            _,
+            kind,
+            count,
+            v0,
+            v1,
+            a0,
+            a1,
+            ref body @ ..,
+            b0,
+            b1,
+            _,
+            _,
+        ] = frame
+        else {
+            return None;
+        };
+        let first = angle(a0, a1)?;
+        let last = angle(b0, b1)?;
+        let step = divided(last.wrapping_sub(first), u32::from(count).saturating_sub(1));
+        let mut points = [0; 4 * MOST_POINTS];
+        points.get_mut(..body.len())?.copy_from_slice(body);
+        Some(Packet {
+            speed_rpm_q6: u16::from_le_bytes([v0, v1]),
+            view: View {
+                first_us: pace.first_us(count.into(), self.base.period_q8, frame.len() as u16),
+                turn_start: self.turns.find(first, step, count.into()),
+                ..self.base
+            },
+            first,
+            step,
+            point_bytes: point_bytes(kind),
+            bytes: body.len() as u8,
+            points,
+        })
+    }
+}
+
+/// Angle of a point; 2³² is a turn.
+fn angle(low: u8, high: u8) -> Option<u32> {
+    let q6 = u16::from_le_bytes([low, high]).checked_sub(0xa000)?;
+    Some(from_deg_q6(u32::from(q6)))
+}
+
+const fn point_bytes(kind: u8) -> u8 {
+    match kind {
+        2 => 2,
+        3 => 3,
+        7 => 4,
+        _ => 0,
+    }
+}
+
+/// Camsense frames among other bytes.
+pub(super) fn judge(bytes: &[u8]) -> Verdict {
+    match *bytes {
+        [0x55] => Verdict::Need(2),
+        [0x55, 0xaa] | [0x55, 0xaa, _] => Verdict::Need(4),
+        [0x55, 0xaa, kind @ (2 | 3 | 7), count, ..] if (1..=MOST_POINTS as u8).contains(&count) => {
+            let length = 12 + usize::from(count) * usize::from(point_bytes(kind));
+            if length % 2 == 1 {
+                return Verdict::No;
+            }
+            let Some((body, code)) = bytes.get(..length).and_then(<[u8]>::split_last_chunk::<2>)
+            else {
+                return Verdict::Need(length);
+            };
+            let last = body.last_chunk::<2>();
+            let angles_hold = matches!(*bytes, [_, _, _, _, _, _, a0, a1, ..] if angle(a0, a1).is_some())
+                && last.is_some_and(|&[b0, b1]| angle(b0, b1).is_some());
+            if angles_hold && xv11::check_code(body) == u16::from_le_bytes(*code) {
+                Verdict::Frame(length)
+            } else {
+                Verdict::CheckFailed
+            }
+        }
+        _ => Verdict::No,
+    }
+}
+
+/// Up to 40 points.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Packet {
+    /// Speed of the motor (rpm/64).
+    pub speed_rpm_q6: u16,
+    view: View,
+    first: u32,
+    step: u32,
+    point_bytes: u8,
+    bytes: u8,
+    points: [u8; 4 * MOST_POINTS],
+}
+
+impl super::Packet for Packet {
+    fn view(&self) -> &View {
+        &self.view
+    }
+
+    fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
+        let points = self.points.get(..usize::from(self.bytes)).unwrap_or(&[]);
+        let mut angle = self.first;
+        points
+            .chunks_exact(usize::from(self.point_bytes).max(2))
+            .map(move |point| {
+                let (word, quality) = match *point {
+                    [w0, w1] => (u16::from_le_bytes([w0, w1]), 0),
+                    [w0, w1, quality] => (u16::from_le_bytes([w0, w1]), quality.into()),
+                    [w0, w1, q0, q1] => {
+                        (u16::from_le_bytes([w0, w1]), u16::from_le_bytes([q0, q1]))
+                    }
+                    _ => (0, 0),
+                };
+                let reading = Reading {
+                    angle,
+                    range: xv11::range(word),
+                    quality,
+                };
+                angle = angle.wrapping_add(self.step);
+                reading
+            })
+    }
+}

@@ -1,0 +1,143 @@
+//! COIN-D4: frames of up to 80 samples of three bytes.
+//!
+//! Source: one open description; no recording was to be had.
+//!
+//! | offset | field | unit |
+//! | --- | --- | --- |
+//! | 0 | `0xAA 0x55` | sync |
+//! | 2 | bit 0: speed valid; bits 7:1 speed | 0.1 Hz |
+//! | 3 | number of samples n | |
+//! | 4 | angle of the first sample | 1/128° clockwise, `u16` LE |
+//! | 6 | angle of the last sample | 1/128° clockwise, `u16` LE |
+//! | 8 | XOR of the bytes at even offsets; at odd ones | without these two |
+//! | 10 + 3k | intensity; 2 flags and 14 bits of distance, 0 for none | `u8`; mm, `u16` LE |
+
+use super::packet::{Turns, divided, from_deg_q6};
+use super::timing::Pace;
+use super::{Model, Reading, Verdict, View};
+
+/// Most samples of a frame.
+pub const MOST_SAMPLES: usize = 80;
+/// Bytes of the longest frame.
+pub const FRAME: usize = 10 + 3 * MOST_SAMPLES;
+/// Starts motor and stream.
+pub const START: [u8; 4] = [0xaa, 0x55, 0xf0, 0x0f];
+/// Stops motor and stream.
+pub const STOP: [u8; 4] = [0xaa, 0x55, 0xf5, 0x0a];
+
+/// Push parser. About 360 bytes.
+pub type Parser = super::Parser<Format, FRAME>;
+
+impl Parser {
+    /// Any of the family.
+    #[must_use]
+    pub const fn for_model(model: &Model) -> Self {
+        let format = Format {
+            base: View::of(model, 0),
+            turns: Turns::new(),
+        };
+        Self::with_format(format, model.baud)
+    }
+}
+
+/// State of the parser.
+#[derive(Debug, Clone)]
+pub struct Format {
+    base: View,
+    turns: Turns,
+}
+
+impl super::Format for Format {
+    type Packet = Packet;
+
+    fn judge(&self, bytes: &[u8]) -> Verdict {
+        judge(bytes)
+    }
+
+    fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {
+        let &[_, _, speed, count, a0, a1, b0, b1, _, _, ref body @ ..] = frame else {
+            return None;
+        };
+        let first = from_deg_q6(u16::from_le_bytes([a0, a1]).into()) >> 1;
+        let last = from_deg_q6(u16::from_le_bytes([b0, b1]).into()) >> 1;
+        let step = divided(last.wrapping_sub(first), u32::from(count).saturating_sub(1));
+        let mut samples = [0; 3 * MOST_SAMPLES];
+        samples.get_mut(..body.len())?.copy_from_slice(body);
+        Some(Packet {
+            speed_dhz: (speed & 1 == 1).then_some(speed >> 1),
+            view: View {
+                first_us: pace.first_us(count.into(), self.base.period_q8, frame.len() as u16),
+                turn_start: self.turns.find(first, step, count.into()),
+                ..self.base
+            },
+            first,
+            step,
+            bytes: body.len() as u8,
+            samples,
+        })
+    }
+}
+
+/// COIN-D4 frames among other bytes.
+pub(super) fn judge(bytes: &[u8]) -> Verdict {
+    match *bytes {
+        [0xaa] => Verdict::Need(2),
+        [0xaa, 0x55] | [0xaa, 0x55, _] => Verdict::Need(4),
+        [0xaa, 0x55, _, count, ..] if (1..=MOST_SAMPLES as u8).contains(&count) => {
+            let length = 10 + 3 * usize::from(count);
+            let Some(frame) = bytes.get(..length) else {
+                return Verdict::Need(length);
+            };
+            let code = frame
+                .chunks(2)
+                .fold((0, 0), |(even, odd), pair| match *pair {
+                    [a, b] => (even ^ a, odd ^ b),
+                    [a] => (even ^ a, odd),
+                    _ => (even, odd),
+                });
+            if code == (0, 0) {
+                Verdict::Frame(length)
+            } else {
+                Verdict::CheckFailed
+            }
+        }
+        _ => Verdict::No,
+    }
+}
+
+/// Up to 80 samples.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Packet {
+    /// Speed (0.1 turns/s), where the frame tells.
+    pub speed_dhz: Option<u8>,
+    view: View,
+    first: u32,
+    step: u32,
+    bytes: u8,
+    samples: [u8; 3 * MOST_SAMPLES],
+}
+
+impl super::Packet for Packet {
+    fn view(&self) -> &View {
+        &self.view
+    }
+
+    fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
+        let samples = self.samples.get(..usize::from(self.bytes)).unwrap_or(&[]);
+        let mut angle = self.first;
+        samples.chunks_exact(3).map(move |sample| {
+            let (quality, mm) = match *sample {
+                [quality, low, high] => (quality, u16::from_le_bytes([low, high]) >> 2),
+                _ => (0, 0),
+            };
+            let reading = Reading {
+                angle,
+                range: Reading::range_q2(u32::from(mm) << 2),
+                quality: quality.into(),
+            };
+            angle = angle.wrapping_add(self.step);
+            reading
+        })
+    }
+}

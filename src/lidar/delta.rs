@@ -1,0 +1,254 @@
+//! 3irobotix Delta-1A, 2A, 2B, 2D, 2G: big-endian frames of a sixteenth or a fifteenth of a turn.
+//!
+//! Source: the makers' protocol documents and their example frames. The host drives the motor.
+//!
+//! | offset | field | unit |
+//! | --- | --- | --- |
+//! | 0 | `0xAA` | sync |
+//! | 1 | length L without the sum | `u16` BE |
+//! | 3 | version; `0x10` has the angle of the sector's end | |
+//! | 4 | `0x61` | |
+//! | 5 | `0xAD` measurements, `0xAE` speed out of range | |
+//! | 6 | length of the data, L - 8 | `u16` BE |
+//! | 8 | speed | 0.05 turns/s |
+//! | 9 | zero offset; informative | 0.01°, `i16` BE |
+//! | 11 | angle of the sector's start; of its end | 0.01° clockwise, `u16` BE |
+//! | … | n points: signal; distance, 0 for none | `u8`; mm/4, `u16` BE |
+//! | L | sum of all before | `u16` BE |
+
+use super::packet::{Turns, divided, from_cdeg};
+use super::timing::Pace;
+use super::{Family, Model, Reading, Verdict, View};
+
+/// Bytes of the longest frame.
+pub const FRAME: usize = 1026;
+/// Most points that a frame is believed to have; further ones are left out.
+pub const MOST_POINTS: usize = 120;
+
+/// How much of a turn a frame covers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Sector {
+    /// 22.5°: Delta-1A, 2A, 2B.
+    Sixteenth,
+    /// 24°: Delta-2G and some that are called Delta-2.
+    Fifteenth,
+}
+
+impl Sector {
+    const fn cdeg(self) -> u32 {
+        match self {
+            Self::Sixteenth => 2250,
+            Self::Fifteenth => 2400,
+        }
+    }
+}
+
+/// Push parser. About 1150 bytes; a packet has 400.
+pub type Parser = super::Parser<Format, FRAME>;
+
+impl Parser {
+    /// Any of the family.
+    #[must_use]
+    pub const fn for_model(model: &Model) -> Self {
+        let format = Format {
+            base: View::of(model, 0),
+            sector: match model.family {
+                Family::Delta(sector) => sector,
+                _ => Sector::Sixteenth,
+            },
+            previous_cdeg: None,
+            turns: Turns::new(),
+        };
+        Self::with_format(format, model.baud)
+    }
+}
+
+/// State of the parser.
+#[derive(Debug, Clone)]
+pub struct Format {
+    base: View,
+    sector: Sector,
+    previous_cdeg: Option<u16>,
+    turns: Turns,
+}
+
+impl Format {
+    /// Angle that this frame covers: by its own fields, or by its distance from the one before.
+    fn span_cdeg(&mut self, start: u16, end: Option<u16>) -> u32 {
+        let from = |from: u16, to: u16| {
+            let wrap = if to < from { 36_000 } else { 0 };
+            (u32::from(to) + wrap).saturating_sub(from.into())
+        };
+        if let Some(end) = end {
+            return from(start, end);
+        }
+        // Units were sold under one name with both sectors: two frames in a row tell.
+        match self
+            .previous_cdeg
+            .replace(start)
+            .map(|previous| from(previous, start))
+        {
+            Some(2240..=2260) => self.sector = Sector::Sixteenth,
+            Some(2390..=2410) => self.sector = Sector::Fifteenth,
+            _ => {}
+        }
+        self.sector.cdeg()
+    }
+}
+
+impl super::Format for Format {
+    type Packet = Packet;
+
+    fn judge(&self, bytes: &[u8]) -> Verdict {
+        judge(bytes)
+    }
+
+    fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {
+        let (body, _) = frame.split_last_chunk::<2>()?;
+        let (start_cdeg, end_cdeg, points) = match *body {
+            [
+                _,
+                _,
+                _,
+                0x10,
+                _,
+                0xad,
+                _,
+                _,
+                _,
+                _,
+                _,
+                a0,
+                a1,
+                b0,
+                b1,
+                ref points @ ..,
+            ] => (
+                u16::from_be_bytes([a0, a1]),
+                Some(u16::from_be_bytes([b0, b1])),
+                points,
+            ),
+            [_, _, _, _, _, 0xad, _, _, _, _, _, a0, a1, ref points @ ..] => {
+                (u16::from_be_bytes([a0, a1]), None, points)
+            }
+            _ => (0, None, &[][..]),
+        };
+        let &[_, _, _, _, _, command, _, _, speed_q05, ..] = body else {
+            return None;
+        };
+        let points = points.get(..3 * MOST_POINTS).unwrap_or(points);
+        let count = (points.len() / 3) as u16;
+        let (mut first, mut step, mut turn_start) = (0, 0, None);
+        if command == 0xad {
+            let span = from_cdeg(self.span_cdeg(start_cdeg, end_cdeg));
+            first = from_cdeg(start_cdeg.into());
+            step = divided(span, count.into());
+            turn_start = self.turns.find(first, step, count);
+        }
+        // A turn at so many 0.05 turns a second takes 20e6 µs divided by them; `step` is a share of 2³² of it.
+        let turn_us = divided(20_000_000, speed_q05.into());
+        let period_q8 = if turn_us == 0 || step == 0 {
+            self.base.period_q8
+        } else {
+            ((u64::from(turn_us) * u64::from(step)) >> 24) as u32
+        };
+        let mut packet = Packet {
+            command,
+            speed_q05,
+            view: View {
+                first_us: pace.first_us(count, period_q8, frame.len() as u16),
+                period_q8,
+                turn_start,
+                ..self.base
+            },
+            first,
+            step,
+            bytes: 3 * count,
+            points: [0; 3 * MOST_POINTS],
+        };
+        let bytes = usize::from(packet.bytes);
+        packet
+            .points
+            .get_mut(..bytes)?
+            .copy_from_slice(points.get(..bytes)?);
+        Some(packet)
+    }
+}
+
+/// Delta frames among other bytes.
+pub(super) fn judge(bytes: &[u8]) -> Verdict {
+    match *bytes {
+        [0xaa] | [0xaa, _] => Verdict::Need(3),
+        [0xaa, l0, l1, ref rest @ ..] => {
+            let length = usize::from(u16::from_be_bytes([l0, l1]));
+            if !(8..=FRAME - 2).contains(&length) {
+                return Verdict::No;
+            }
+            match *rest {
+                [_, 0x61, _, d0, d1, ..]
+                    if usize::from(u16::from_be_bytes([d0, d1])) + 8 != length =>
+                {
+                    Verdict::No
+                }
+                [_, 0x61, _, _, _, ..] => {
+                    let frame = bytes.get(..length + 2);
+                    let Some((body, code)) = frame.and_then(<[u8]>::split_last_chunk::<2>) else {
+                        return Verdict::Need(length + 2);
+                    };
+                    let sum = body
+                        .iter()
+                        .fold(0u16, |sum, byte| sum.wrapping_add(u16::from(*byte)));
+                    if sum == u16::from_be_bytes(*code) {
+                        Verdict::Frame(length + 2)
+                    } else {
+                        Verdict::CheckFailed
+                    }
+                }
+                [_, 0x61, ..] => Verdict::Need(8),
+                [_, _, ..] => Verdict::No,
+                _ => Verdict::Need(5),
+            }
+        }
+        _ => Verdict::No,
+    }
+}
+
+/// Up to 120 points, or the report of a wrong speed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Packet {
+    /// `0xAD` measurements, `0xAE` speed out of range.
+    pub command: u8,
+    /// Speed of the motor (0.05 turns/s).
+    pub speed_q05: u8,
+    view: View,
+    first: u32,
+    step: u32,
+    bytes: u16,
+    points: [u8; 3 * MOST_POINTS],
+}
+
+impl super::Packet for Packet {
+    fn view(&self) -> &View {
+        &self.view
+    }
+
+    fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
+        let points = self.points.get(..usize::from(self.bytes)).unwrap_or(&[]);
+        let mut angle = self.first;
+        points.chunks_exact(3).map(move |point| {
+            let (quality, quarters) = match *point {
+                [quality, d0, d1] => (quality, u16::from_be_bytes([d0, d1])),
+                _ => (0, 0),
+            };
+            let reading = Reading {
+                angle,
+                range: Reading::range_q2(quarters.into()),
+                quality: quality.into(),
+            };
+            angle = angle.wrapping_add(self.step);
+            reading
+        })
+    }
+}

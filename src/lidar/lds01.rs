@@ -1,0 +1,134 @@
+//! LDS-01 (HLS-LFCD2): 42-byte frames of 6 points, 60 a turn.
+//!
+//! Source: two independent open drivers that agree. The command `b` starts motor and stream, `e` stops both.
+//!
+//! | offset | field | unit |
+//! | --- | --- | --- |
+//! | 0 | `0xFA` | sync |
+//! | 1 | `0xA0` + index 0…59 | 6° |
+//! | 2 | speed | 0.1 rpm, `u16` LE |
+//! | 4 + 6k | intensity; distance, 0 for none; reserved | `u16` LE; mm, `u16` LE; `u16` |
+//! | 40 | inverted sum of all before, twice | `u8`; `u8` |
+
+use super::packet::{Turns, divided, from_cdeg};
+use super::timing::Pace;
+use super::{Model, Reading, Verdict, View};
+
+/// Bytes of a frame.
+pub const FRAME: usize = 42;
+/// Starts motor and stream.
+pub const START: u8 = b'b';
+/// Stops motor and stream.
+pub const STOP: u8 = b'e';
+
+/// Push parser. About 150 bytes.
+pub type Parser = super::Parser<Format, FRAME>;
+
+impl Parser {
+    /// Any of the family.
+    #[must_use]
+    pub const fn for_model(model: &Model) -> Self {
+        let format = Format {
+            base: View::of(model, 4),
+            turns: Turns::new(),
+        };
+        Self::with_format(format, model.baud)
+    }
+}
+
+/// State of the parser.
+#[derive(Debug, Clone)]
+pub struct Format {
+    base: View,
+    turns: Turns,
+}
+
+impl super::Format for Format {
+    type Packet = Packet;
+
+    fn judge(&self, bytes: &[u8]) -> Verdict {
+        judge(bytes)
+    }
+
+    fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {
+        let frame: &[u8; FRAME] = frame.try_into().ok()?;
+        let &[_, index, v0, v1, ref points @ .., _, _] = frame;
+        let index = index.saturating_sub(0xa0);
+        let speed_drpm = u16::from_le_bytes([v0, v1]);
+        let first = from_cdeg(600 * u32::from(index));
+        // A degree at so many 0.1 rpm takes 10e6 / 6 µs divided by them.
+        let period_q8 = match u32::from(speed_drpm) {
+            speed @ 1000..10_000 => divided(426_666_667, speed),
+            _ => self.base.period_q8,
+        };
+        Some(Packet {
+            index,
+            speed_drpm,
+            view: View {
+                first_us: pace.first_us(6, period_q8, FRAME as u16),
+                period_q8,
+                turn_start: self.turns.find(first, from_cdeg(100), 6),
+                ..self.base
+            },
+            first,
+            points: *points,
+        })
+    }
+}
+
+/// LDS-01 frames among other bytes.
+pub(super) fn judge(bytes: &[u8]) -> Verdict {
+    match *bytes {
+        [0xfa] => Verdict::Need(2),
+        [0xfa, 0xa0..=0xdb, ..] => match bytes.get(..FRAME).and_then(<[u8]>::split_last_chunk::<2>)
+        {
+            None => Verdict::Need(FRAME),
+            Some((body, code)) if *code == [check_code(body); 2] => Verdict::Frame(FRAME),
+            Some(_) => Verdict::CheckFailed,
+        },
+        _ => Verdict::No,
+    }
+}
+
+/// Inverted sum of the bytes.
+fn check_code(body: &[u8]) -> u8 {
+    !body.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte))
+}
+
+/// Six points.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Packet {
+    /// Which half dozen of degrees, 0…59.
+    pub index: u8,
+    /// Speed of the motor (0.1 rpm).
+    pub speed_drpm: u16,
+    view: View,
+    first: u32,
+    points: [u8; 36],
+}
+
+impl super::Packet for Packet {
+    fn view(&self) -> &View {
+        &self.view
+    }
+
+    fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
+        let mut angle = self.first;
+        self.points.chunks_exact(6).map(move |point| {
+            let (quality, mm) = match *point {
+                [q0, q1, d0, d1, _, _] => {
+                    (u16::from_le_bytes([q0, q1]), u16::from_le_bytes([d0, d1]))
+                }
+                _ => (0, 0),
+            };
+            let reading = Reading {
+                angle,
+                range: Reading::range_q2(u32::from(mm) << 2),
+                quality,
+            };
+            angle = angle.wrapping_add(from_cdeg(100));
+            reading
+        })
+    }
+}

@@ -1,0 +1,1 @@
+//! RPLIDAR requests and what answers them.

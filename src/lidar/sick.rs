@@ -1,0 +1,217 @@
+//! SICK LMS200, LMS211, LMS291: telegrams with a half turn of measurements.
+//!
+//! Source: SICK telegram listing; open drivers' check code. A rotating mirror with 75 turns a second.
+//!
+//! | offset | field | unit |
+//! | --- | --- | --- |
+//! | 0 | `0x02` | start |
+//! | 1 | address: `0x80` from the sensor, `0x00` to it | |
+//! | 2 | length n | `u16` LE |
+//! | 4 | command or answer and its data, n bytes | |
+//! | 4 + n | CRC-16 of all before | `u16` LE |
+//!
+//! Answer `0xB0`: `u16` (count in bits 9:0, partial scan in 12:11, unit in 15:14: 0 cm, 1 mm), as many `u16` with 13
+//! bits of distance, a status byte. Counter-clockwise from the right-hand side.
+
+use super::packet::from_cdeg;
+use super::timing::Pace;
+use super::{Model, Reading, Verdict, View};
+use crate::scan::NoReturn;
+
+/// Bytes of the longest telegram.
+pub const FRAME: usize = 4 + 812 + 2;
+/// Most measurements of a telegram.
+pub const MOST_VALUES: usize = 401;
+
+/// Payload that starts the stream.
+pub const START: [u8; 2] = [0x20, 0x24];
+/// Payload that stops it.
+pub const STOP: [u8; 2] = [0x20, 0x25];
+/// Payload that asks for the status.
+pub const STATUS: [u8; 1] = [0x31];
+/// Payload that sets 38 400 baud.
+pub const BAUD_38400: [u8; 2] = [0x20, 0x40];
+/// Payload that sets 9600 baud.
+pub const BAUD_9600: [u8; 2] = [0x20, 0x42];
+/// Payload that sets 500 000 baud.
+pub const BAUD_500K: [u8; 2] = [0x20, 0x48];
+/// Payload that chooses 180° in steps of 0.5°.
+pub const HALF_DEGREES: [u8; 5] = [0x3b, 0xb4, 0x00, 0x32, 0x00];
+/// Payload that chooses 180° in steps of 1°.
+pub const WHOLE_DEGREES: [u8; 5] = [0x3b, 0xb4, 0x00, 0x64, 0x00];
+
+/// Push parser. About 950 bytes; a packet has 850.
+pub type Parser = super::Parser<Format, FRAME>;
+
+impl Parser {
+    /// Any of the family.
+    #[must_use]
+    pub const fn for_model(model: &Model) -> Self {
+        let format = Format {
+            base: View::of(model, 0),
+        };
+        Self::with_format(format, model.baud)
+    }
+}
+
+/// State of the parser.
+#[derive(Debug, Clone)]
+pub struct Format {
+    base: View,
+}
+
+impl super::Format for Format {
+    type Packet = Packet;
+
+    fn judge(&self, bytes: &[u8]) -> Verdict {
+        judge(bytes)
+    }
+
+    fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {
+        let (body, _) = frame.split_last_chunk::<2>()?;
+        let &[_, _, _, _, answer, ref data @ ..] = body else {
+            return None;
+        };
+        let mut packet = Packet {
+            answer,
+            unit_q2: 0,
+            view: self.base,
+            first: 0,
+            step: 0,
+            count: 0,
+            values: [0; 2 * MOST_VALUES],
+        };
+        let (0xb0, &[h0, h1, ref values @ ..]) = (answer, data) else {
+            return Some(packet);
+        };
+        let header = u16::from_le_bytes([h0, h1]);
+        let count = (header & 0x3ff)
+            .min(MOST_VALUES as u16)
+            .min((values.len() / 2) as u16);
+        let bytes = 2 * usize::from(count);
+        packet
+            .values
+            .get_mut(..bytes)?
+            .copy_from_slice(values.get(..bytes)?);
+        packet.count = count;
+        packet.unit_q2 = if header >> 14 == 1 { 4 } else { 40 };
+        // The count says which of the sensor's fields of view and steps this is.
+        let (start_cdeg, step_cdeg) = match count {
+            361 => (0, 50),
+            401 => (4000, 25),
+            201 => (4000, 50),
+            101 => (4000, 100),
+            _ => (0, 100),
+        };
+        let partial = if header & 0x2000 != 0 {
+            (header >> 11) & 3
+        } else {
+            0
+        };
+        packet.first = from_cdeg(start_cdeg + 25 * u32::from(partial));
+        packet.step = from_cdeg(step_cdeg);
+        // The mirror takes 13.3 ms a turn.
+        packet.view.period_q8 = step_cdeg * 3_413_333 / 36_000;
+        packet.view.first_us = pace.first_us(count, packet.view.period_q8, frame.len() as u16);
+        packet.view.turn_start = Some(0);
+        Some(packet)
+    }
+}
+
+/// Telegrams among other bytes.
+pub(super) fn judge(bytes: &[u8]) -> Verdict {
+    match *bytes {
+        [0x02] => Verdict::Need(2),
+        [0x02, 0x80 | 0x00] | [0x02, 0x80 | 0x00, _] => Verdict::Need(4),
+        [0x02, 0x80 | 0x00, l0, l1, ..] => {
+            let length = usize::from(u16::from_le_bytes([l0, l1]));
+            if !(1..=FRAME - 6).contains(&length) {
+                return Verdict::No;
+            }
+            let Some((body, code)) = bytes
+                .get(..length + 6)
+                .and_then(<[u8]>::split_last_chunk::<2>)
+            else {
+                return Verdict::Need(length + 6);
+            };
+            if check_code(body) == u16::from_le_bytes(*code) {
+                Verdict::Frame(length + 6)
+            } else {
+                Verdict::CheckFailed
+            }
+        }
+        _ => Verdict::No,
+    }
+}
+
+/// The sensor's CRC-16, which takes each byte together with the one before.
+#[must_use]
+pub fn check_code(bytes: &[u8]) -> u16 {
+    let mut previous = 0u8;
+    bytes.iter().fold(0u16, |crc, &byte| {
+        let poly = if crc & 0x8000 != 0 { 0x8005 } else { 0 };
+        let pair = u16::from_le_bytes([byte, previous]);
+        previous = byte;
+        (crc << 1) ^ poly ^ pair
+    })
+}
+
+/// Encodes a command into `telegram`; gives the part of it that was used, or `None` where it is too short.
+#[must_use]
+pub fn encode<'a>(payload: &[u8], telegram: &'a mut [u8]) -> Option<&'a [u8]> {
+    let length = u16::try_from(payload.len()).ok()?;
+    let whole = telegram.get_mut(..payload.len() + 6)?;
+    let (body, code) = whole.split_last_chunk_mut::<2>()?;
+    let (header, data) = body.split_first_chunk_mut::<4>()?;
+    let [l0, l1] = length.to_le_bytes();
+    *header = [0x02, 0x00, l0, l1];
+    data.copy_from_slice(payload);
+    *code = check_code(body).to_le_bytes();
+    Some(whole)
+}
+
+/// One telegram of the sensor's.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Packet {
+    /// What it is: `0xB0` measurements.
+    pub answer: u8,
+    unit_q2: u8,
+    view: View,
+    first: u32,
+    step: u32,
+    count: u16,
+    values: [u8; 2 * MOST_VALUES],
+}
+
+impl super::Packet for Packet {
+    fn view(&self) -> &View {
+        &self.view
+    }
+
+    fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
+        let values = self
+            .values
+            .get(..2 * usize::from(self.count))
+            .unwrap_or(&[]);
+        let mut angle = self.first;
+        values.chunks_exact(2).map(move |value| {
+            let value = match *value {
+                [low, high] => u16::from_le_bytes([low, high]) & 0x1fff,
+                _ => 0,
+            };
+            let reading = Reading {
+                angle,
+                range: match value {
+                    // The last nine values are the sensor's error codes; the first of them is "too far".
+                    0x1ff7 => Err(NoReturn::TooFar),
+                    0x1ff8.. => Err(NoReturn::Sensor(value as u8)),
+                    _ => Reading::range_q2(u32::from(value) * u32::from(self.unit_q2)),
+                },
+                quality: 0,
+            };
+            angle = angle.wrapping_add(self.step);
+            reading
+        })
+    }
+}
