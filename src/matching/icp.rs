@@ -75,9 +75,16 @@ impl Default for IcpConfig {
 }
 
 /// Gates of the coarse passes (see [`Pass::gate`]): a metre, then halving.
-const COARSE: [u8; 8] = [8, 8, 8, 8, 7, 7, 6, 6];
-/// Gates of the passes over all points.
-const FINE: [u8; 2] = [5, 5];
+const COARSE: [u8; 8] = [9, 9, 9, 8, 8, 7, 7, 6];
+/// Gate and most of the passes that follow while steps are longer than `COARSE_STILL` (m).
+const COARSE_LAST: u8 = 6;
+const COARSE_MORE: usize = 8;
+const COARSE_STILL: f32 = 0.02;
+/// Gate and most of the passes over all points.
+const FINE: u8 = 5;
+const FINE_MOST: usize = 8;
+/// A step this short (m) ends the match.
+const CONVERGED: f32 = 0.003;
 
 /// Pose of the lidar that saw `points` in the frame of the one that saw `reference`.
 ///
@@ -125,6 +132,20 @@ pub fn align_observed<const N: usize>(
     quality::verdict(&task, &best, guess)
 }
 
+/// A pass and the step it led to.
+struct Stepped {
+    at: FixedPose,
+    sums: Sums,
+    /// Length of the step (m): see [`step_length`].
+    length: f32,
+}
+
+/// Length of a step (m), a turn counted at 3 m.
+fn step_length(step: [f32; 3]) -> f32 {
+    let [x, y, t] = step.map(crate::math::abs);
+    x + y + 3.0 * t
+}
+
 /// What stays the same over one match.
 struct Task<'a> {
     lines: &'a [Line],
@@ -140,47 +161,51 @@ impl Task<'_> {
         stride.clamp(1, 255) as u8
     }
 
-    /// Runs passes with `gates`, each followed by a Gauss–Newton step; gives the last pass' sums and step.
-    fn descend(
-        &self,
-        at: FixedPose,
-        stride: u8,
-        gates: &[u8],
-        observe: &mut impl FnMut(Pose),
-    ) -> Result<(FixedPose, Sums, [f32; 3]), MatchError> {
-        let mut state = (at, Sums::default(), [0.0; 3]);
-        let needed = self.config.min_inliers / u16::from(stride) / 2;
-        for (k, &gate) in gates.iter().enumerate() {
-            // Another set of points each time.
-            let first = k % usize::from(stride.max(1));
-            let sums = pass::run(
-                self.lines,
-                self.points,
-                state.0,
-                Pass { stride, gate },
-                first,
-            );
-            if sums.inliers < needed {
-                let found = sums.inliers;
-                return Err(MatchError::TooFewCorrespondences { found, needed });
-            }
-            let (h, b) = sums.equations();
-            let step = h.solve(b).ok_or(MatchError::Degenerate)?;
-            state = (state.0.moved(step), sums, step);
-            observe(state.0.pose());
+    /// One pass and its Gauss–Newton step; `k` chooses another set of points each time.
+    fn step(&self, at: FixedPose, pass: Pass, k: usize) -> Result<Stepped, MatchError> {
+        let needed = self.config.min_inliers / u16::from(pass.stride.max(1)) / 2;
+        let sums = pass::run(self.lines, self.points, at, pass, k % usize::from(pass.stride.max(1)));
+        if sums.inliers < needed {
+            let found = sums.inliers;
+            return Err(MatchError::TooFewCorrespondences { found, needed });
         }
-        Ok(state)
+        let (h, b) = sums.equations();
+        let step = h.solve(b).ok_or(MatchError::Degenerate)?;
+        Ok(Stepped {
+            at: at.moved(step),
+            sums,
+            length: step_length(step),
+        })
     }
 
-    /// From a start to a candidate: all the coarse passes, then the score by half of the points.
-    fn coarse(
-        &self,
-        start: FixedPose,
-        observe: &mut impl FnMut(Pose),
-    ) -> Result<Candidate, MatchError> {
+    /// From a start to a candidate: the coarse passes, more at the last gate while it still moves, then the score.
+    fn coarse(&self, start: FixedPose, observe: &mut impl FnMut(Pose)) -> Result<Candidate, MatchError> {
         let stride = self.coarse_stride();
-        let (at, ..) = self.descend(start, stride, &COARSE, observe)?;
+        let mut at = start;
+        for (k, gate) in COARSE.into_iter().chain([COARSE_LAST; COARSE_MORE]).enumerate() {
+            let stepped = self.step(at, Pass { stride, gate }, k)?;
+            at = stepped.at;
+            observe(at.pose());
+            if k + 1 >= COARSE.len() && stepped.length < COARSE_STILL {
+                break;
+            }
+        }
         Ok(self.judged(at))
+    }
+
+    /// Passes over all points until they move the pose no more.
+    fn fine(&self, start: FixedPose, observe: &mut impl FnMut(Pose)) -> Result<Stepped, MatchError> {
+        let pass = Pass { stride: 1, gate: FINE };
+        let mut state = self.step(start, pass, 0)?;
+        for _ in 1..FINE_MOST {
+            observe(state.at.pose());
+            state = self.step(state.at, pass, 0)?;
+            if state.length < CONVERGED {
+                break;
+            }
+        }
+        observe(state.at.pose());
+        Ok(state)
     }
 
     fn judged(&self, at: FixedPose) -> Candidate {

@@ -4,7 +4,7 @@ use crate::{
     geometry::Pose,
     matching::{
         MatchError,
-        icp::{COARSE, FINE, Search, Task, pass::FixedPose},
+        icp::{COARSE, Search, Stepped, Task, pass::FixedPose},
     },
 };
 
@@ -19,9 +19,8 @@ pub(super) struct Candidate {
 /// What [`search`] settled on.
 pub(super) struct Best {
     pub candidate: Candidate,
-    pub sums: super::pass::Sums,
-    /// The last step (m, m, rad).
-    pub step: [f32; 3],
+    /// The last pass.
+    pub last: Stepped,
     pub iterations: u8,
 }
 
@@ -63,13 +62,10 @@ pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<
         }
     }
     let best = best?;
-    let (at, sums, step) = task.descend(best.at, 1, &FINE, observe)?;
+    let last = task.fine(best.at, observe)?;
     Ok(Best {
-        candidate: task.judged(at),
-        sums,
-        step,
-        iterations: starts
-            .saturating_mul(COARSE.len() as u8)
-            .saturating_add(FINE.len() as u8),
+        candidate: task.judged(last.at),
+        last,
+        iterations: starts.saturating_mul(COARSE.len() as u8).saturating_add(2),
     })
 }

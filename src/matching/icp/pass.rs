@@ -214,18 +214,21 @@ pub(super) struct Projection<'a> {
     cos: i32,
     /// Turn and half a line's width.
     turn: u16,
+    /// Half a line's width.
+    half: u16,
 }
 
 impl<'a> Projection<'a> {
     pub fn new(lines: &'a [Line], at: FixedPose) -> Self {
         let (sin, cos) = math::sin_cos_q15_fine(at.turn);
-        let half = 32_768 / (lines.len() as u32).max(1);
+        let half = (32_768 / (lines.len() as u32).max(1)) as u16;
         Self {
             lines,
             at,
             sin,
             cos,
-            turn: ((at.turn.wrapping_add(1 << 15) >> 16) as u16).wrapping_add(half as u16),
+            turn: ((at.turn.wrapping_add(1 << 15) >> 16) as u16).wrapping_add(half),
+            half,
         }
     }
 
@@ -243,36 +246,31 @@ impl<'a> Projection<'a> {
     }
 
     /// The line in the direction of the point, `None` where no surface was seen.
+    ///
+    /// The line where the point would be if the lidars stood at one place tells how far off that is, to first order:
+    /// enough for a few lines, and for no more. Farther off, the direction is worked out.
     pub fn line(&self, placed: &Placed) -> Option<&'a Line> {
+        const NEAR: i32 = 2;
         let bins = self.lines.len() as i32;
         let (x, y) = (placed.x >> 4, placed.y >> 4);
-        let mut index = ((u32::from(placed.turn) * bins as u32) >> 16) as i32;
-        // A near line sees a far point at a distance that one cross product underrates: look twice.
-        for _ in 0..2 {
-            let line = self.lines.get(index as usize)?;
-            let off = if line.is_some() {
-                let across = i32::from(line.ux) * y - i32::from(line.uy) * x;
-                (across + (1 << 15)) >> 16
+        let index = ((u32::from(placed.turn) * bins as u32) >> 16) as i32;
+        let line = self.lines.get(index as usize)?;
+        let across = i32::from(line.ux) * y - i32::from(line.uy) * x;
+        let off = (across + (1 << 15)) >> 16;
+        let found = if line.is_some() && (-NEAR..=NEAR).contains(&off) {
+            let moved = index + off;
+            if moved < 0 {
+                moved + bins
+            } else if moved >= bins {
+                moved - bins
             } else {
-                let half = 32_768 / bins;
-                let seen = math::atan2_turn(y, x).wrapping_add(half as u16);
-                let to = ((u32::from(seen) * bins as u32) >> 16) as i32;
-                return self.lines.get(to as usize).filter(|line| line.is_some());
-            };
-            if off == 0 {
-                return Some(line);
+                moved
             }
-            index += off;
-            if index < 0 {
-                index += bins;
-            } else if index >= bins {
-                index -= bins;
-            }
-            if off.unsigned_abs() <= 2 {
-                break;
-            }
-        }
-        self.lines.get(index as usize).filter(|line| line.is_some())
+        } else {
+            let turn = math::atan2_turn(y, x).wrapping_add(self.half);
+            ((u32::from(turn) * bins as u32) >> 16) as i32
+        };
+        self.lines.get(found as usize).filter(|line| line.is_some())
     }
 }
 

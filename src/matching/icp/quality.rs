@@ -17,22 +17,21 @@ const WEAK_SHARE: f32 = 0.02;
 const INFLATION: f32 = 2.0;
 /// Errors that no residual shows (m, rad).
 const FLOOR: (f32, f32) = (0.0005, 0.0001);
-/// Longest last step of a match that has converged (m).
-const CONVERGED: f32 = 0.01;
+/// Longest last step of a match that is believed (m).
+const TOO_LONG: f32 = 0.05;
 
 /// Judges the best candidate and keeps the guess along a direction that the scene does not determine.
 pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match, MatchError> {
     let config = task.config;
-    if best.sums.inliers < config.min_inliers {
+    if best.last.sums.inliers < config.min_inliers {
         return Err(MatchError::TooFewCorrespondences {
-            found: best.sums.inliers,
+            found: best.last.sums.inliers,
             needed: config.min_inliers,
         });
     }
     let lever = mean_range(task);
-    let step = math::sqrt(best.step[0] * best.step[0] + best.step[1] * best.step[1])
-        + lever * math::abs(best.step[2]);
-    if step > CONVERGED {
+    let step = best.last.length;
+    if step > TOO_LONG {
         return Err(MatchError::NotConverged { step });
     }
     if best.candidate.value < config.min_score {
@@ -40,14 +39,14 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
             score: best.candidate.value,
         });
     }
-    let (h, _) = best.sums.equations();
+    let (h, _) = best.last.sums.equations();
     let scaled = h.theta_scaled(1.0 / lever);
     let eigen = scaled.eigen();
-    let threshold = WEAK_SHARE * best.sums.total_weight();
+    let threshold = WEAK_SHARE * best.last.sums.total_weight();
     if eigen[1].0 < threshold {
         return Err(MatchError::Degenerate);
     }
-    let residual = best.sums.residual();
+    let residual = best.last.sums.residual();
     let noise = math::max(residual * residual, config.range_sigma * config.range_sigma);
     let mut pose = best.candidate.at.pose();
     let mut weak = None;
@@ -83,8 +82,8 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         pose,
         covariance: Covariance(covariance),
         information: Information(information),
-        inliers: best.sums.inliers,
-        overlap: best.sums.overlap,
+        inliers: best.last.sums.inliers,
+        overlap: best.last.sums.overlap,
         beams: task.points.len() as u16,
         score: best.candidate.value,
         residual,
