@@ -36,8 +36,8 @@ pub struct Match {
     pub residual: f32,
     /// The direction that the scene hardly determines, if there is one.
     pub weak: Option<WeakDirection>,
-    /// Passes over the beams.
-    pub iterations: u8,
+    /// Starts tried: 1 where the guess was good enough.
+    pub starts: u8,
 }
 
 /// A direction of motion that leaves the match as good as before: along a corridor, about a round room's centre.

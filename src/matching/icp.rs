@@ -51,7 +51,8 @@ pub struct IcpConfig {
     pub coarse_beams: u16,
     /// Fewest beams that must agree with the reference. Default 30.
     pub min_inliers: u16,
-    /// Worst score that is accepted, from 0 (nothing agrees) to 1. Default 0.0.
+    /// Worst score that is accepted, from 0 (nothing agrees) to 1. Default 0.25: on recorded pairs no right
+    /// pose had less than 0.3.
     pub min_score: f32,
     /// Standard deviation of a range (m): the least noise that the covariance assumes. Default 0.01.
     pub range_sigma: f32,
@@ -61,9 +62,9 @@ impl IcpConfig {
     /// For odometry with a cheap lidar.
     pub const DEFAULT: Self = Self {
         search: Search::Local,
-        coarse_beams: 90,
+        coarse_beams: 45,
         min_inliers: 30,
-        min_score: 0.0,
+        min_score: 0.25,
         range_sigma: 0.01,
     };
 }
@@ -74,12 +75,13 @@ impl Default for IcpConfig {
     }
 }
 
-/// Gates of the coarse passes (see [`Pass::gate`]): a metre, then halving.
-const COARSE: [u8; 8] = [9, 9, 9, 8, 8, 7, 7, 6];
-/// Gate and most of the passes that follow while steps are longer than `COARSE_STILL` (m).
-const COARSE_LAST: u8 = 6;
-const COARSE_MORE: usize = 8;
-const COARSE_STILL: f32 = 0.02;
+/// Gate of the first coarse pass (see [`Pass::gate`]) and the one that ends them, and most of them.
+const COARSE_FIRST: u8 = 9;
+const COARSE_LAST: u8 = 5;
+const COARSE_MOST: usize = 16;
+/// A step that is this short compared with the gate narrows it by two, or by one.
+const SHORT: f32 = 1.0 / 16.0;
+const MEDIUM: f32 = 1.0 / 4.0;
 /// Gate and most of the passes over all points.
 const FINE: u8 = 5;
 const FINE_MOST: usize = 8;
@@ -164,7 +166,13 @@ impl Task<'_> {
     /// One pass and its Gauss–Newton step; `k` chooses another set of points each time.
     fn step(&self, at: FixedPose, pass: Pass, k: usize) -> Result<Stepped, MatchError> {
         let needed = self.config.min_inliers / u16::from(pass.stride.max(1)) / 2;
-        let sums = pass::run(self.lines, self.points, at, pass, k % usize::from(pass.stride.max(1)));
+        let sums = pass::run(
+            self.lines,
+            self.points,
+            at,
+            pass,
+            k % usize::from(pass.stride.max(1)),
+        );
         if sums.inliers < needed {
             let found = sums.inliers;
             return Err(MatchError::TooFewCorrespondences { found, needed });
@@ -178,15 +186,26 @@ impl Task<'_> {
         })
     }
 
-    /// From a start to a candidate: the coarse passes, more at the last gate while it still moves, then the score.
-    fn coarse(&self, start: FixedPose, observe: &mut impl FnMut(Pose)) -> Result<Candidate, MatchError> {
+    /// From a start to a candidate: coarse passes whose gate narrows as their steps get shorter, then the score.
+    fn coarse(
+        &self,
+        start: FixedPose,
+        observe: &mut impl FnMut(Pose),
+    ) -> Result<Candidate, MatchError> {
         let stride = self.coarse_stride();
         let mut at = start;
-        for (k, gate) in COARSE.into_iter().chain([COARSE_LAST; COARSE_MORE]).enumerate() {
+        let mut gate = COARSE_FIRST;
+        for k in 0..COARSE_MOST {
             let stepped = self.step(at, Pass { stride, gate }, k)?;
             at = stepped.at;
             observe(at.pose());
-            if k + 1 >= COARSE.len() && stepped.length < COARSE_STILL {
+            let width = f32::from(4u16 << gate) * 1e-3;
+            if stepped.length < width * SHORT {
+                gate -= 2;
+            } else if stepped.length < width * MEDIUM {
+                gate -= 1;
+            }
+            if gate <= COARSE_LAST {
                 break;
             }
         }
@@ -194,8 +213,15 @@ impl Task<'_> {
     }
 
     /// Passes over all points until they move the pose no more.
-    fn fine(&self, start: FixedPose, observe: &mut impl FnMut(Pose)) -> Result<Stepped, MatchError> {
-        let pass = Pass { stride: 1, gate: FINE };
+    fn fine(
+        &self,
+        start: FixedPose,
+        observe: &mut impl FnMut(Pose),
+    ) -> Result<Stepped, MatchError> {
+        let pass = Pass {
+            stride: 1,
+            gate: FINE,
+        };
         let mut state = self.step(start, pass, 0)?;
         for _ in 1..FINE_MOST {
             observe(state.at.pose());

@@ -4,7 +4,7 @@ use crate::{
     geometry::Pose,
     matching::{
         MatchError,
-        icp::{COARSE, Search, Stepped, Task, pass::FixedPose},
+        icp::{Search, Stepped, Task, pass::FixedPose},
     },
 };
 
@@ -21,51 +21,105 @@ pub(super) struct Best {
     pub candidate: Candidate,
     /// The last pass.
     pub last: Stepped,
-    pub iterations: u8,
+    /// Starts tried.
+    pub starts: u8,
 }
 
-/// A score that no wrong pose reached on the recorded pairs: no other start is tried.
+/// A score at which the guess alone is believed, and one at which the starts next to it are.
 const SURE: f32 = 0.7;
+const LIKELY: f32 = 0.5;
 /// Turn between two starts: half of it is within reach of the coarse passes.
 const TURN_STEP: f32 = 10.0 * core::f32::consts::PI / 180.0;
 /// What a start loses per square metre between its end and the guess: a guess is worth something.
-const LOCAL_PULL: f32 = 2.5;
+const NEAR_PULL: f32 = 2.5;
+const FAR_PULL: f32 = 0.5;
 const GLOBAL_PULL: f32 = 0.1;
-/// Starts are ahead of the guess by these (m) in a global search.
+/// Starts of a global search are ahead of the guess by these (m): robots drive forward.
 const AHEAD: [f32; 3] = [0.0, 0.5, 1.0];
+
+/// A ring of starts around the guess.
+struct Ring<'a> {
+    /// Turned by so many steps both ways, from the first to the last.
+    turns: core::ops::RangeInclusive<i8>,
+    /// Moved ahead by these.
+    ahead: &'a [f32],
+    /// See [`NEAR_PULL`].
+    pull: f32,
+}
 
 /// Finds the best candidate: from the guess alone if that is sure, else from turned and moved starts.
 pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<Best, MatchError> {
-    let (turns, ahead, pull) = match task.config.search {
-        Search::Local => (2, &AHEAD[..1], LOCAL_PULL),
-        Search::Global => (6, &AHEAD[..], GLOBAL_PULL),
+    let near = Ring {
+        turns: 1..=2,
+        ahead: &AHEAD[..1],
+        pull: NEAR_PULL,
     };
-    let from_guess = task.coarse(task.start, observe);
-    let mut best = from_guess;
+    let far = Ring {
+        turns: 3..=5,
+        ahead: &AHEAD[..1],
+        pull: FAR_PULL,
+    };
+    let all = Ring {
+        turns: 0..=6,
+        ahead: &AHEAD,
+        pull: GLOBAL_PULL,
+    };
+    let mut best = task.coarse(task.start, observe);
     let mut starts = 1u8;
-    if !best.is_ok_and(|candidate| candidate.value >= SURE) {
-        for turn in -turns..=turns {
-            for &ahead in ahead {
-                if turn == 0 && ahead == 0.0 {
-                    continue;
-                }
-                let start = task.start.moved_far([ahead, 0.0, turn as f32 * TURN_STEP]);
-                starts = starts.saturating_add(1);
-                let Ok(found) = task.coarse(start, &mut |_| ()) else {
-                    continue;
-                };
-                let worth = |c: &Candidate| c.value - pull * c.at.square_distance(task.start);
-                if best.is_err() || best.is_ok_and(|b| worth(&b) < worth(&found)) {
-                    best = Ok(found);
-                }
+    let below =
+        |limit: f32, best: &Result<Candidate, MatchError>| !best.is_ok_and(|b| b.value >= limit);
+    match task.config.search {
+        Search::Local => {
+            if below(SURE, &best) {
+                best = around(task, best, &near, &mut starts);
+            }
+            if below(LIKELY, &best) {
+                best = around(task, best, &far, &mut starts);
+            }
+        }
+        Search::Global => {
+            if below(SURE, &best) {
+                best = around(task, best, &all, &mut starts);
             }
         }
     }
-    let best = best?;
-    let last = task.fine(best.at, observe)?;
+    let last = task.fine(best?.at, observe)?;
     Ok(Best {
         candidate: task.judged(last.at),
         last,
-        iterations: starts.saturating_mul(COARSE.len() as u8).saturating_add(2),
+        starts,
     })
+}
+
+/// Lets the starts of a ring compete with the best so far.
+fn around(
+    task: &Task<'_>,
+    best: Result<Candidate, MatchError>,
+    ring: &Ring<'_>,
+    starts: &mut u8,
+) -> Result<Candidate, MatchError> {
+    let worth = |c: &Candidate| c.value - ring.pull * c.at.square_distance(task.start);
+    let mut best = best;
+    for turn in ring.turns.clone() {
+        for (side, &ahead) in [1.0, -1.0]
+            .into_iter()
+            .flat_map(|side| ring.ahead.iter().map(move |a| (side, a)))
+        {
+            // Not turned is the same both ways, and not moved either it is the guess itself.
+            if turn == 0 && (side < 0.0 || ahead == 0.0) {
+                continue;
+            }
+            let start = task
+                .start
+                .moved_far([ahead, 0.0, side * f32::from(turn) * TURN_STEP]);
+            *starts = starts.saturating_add(1);
+            let Ok(found) = task.coarse(start, &mut |_| ()) else {
+                continue;
+            };
+            if !best.is_ok_and(|b| worth(&b) >= worth(&found)) {
+                best = Ok(found);
+            }
+        }
+    }
+    best
 }

@@ -88,7 +88,7 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         score: best.candidate.value,
         residual,
         weak,
-        iterations: best.iterations,
+        starts: best.starts,
     })
 }
 
