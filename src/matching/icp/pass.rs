@@ -104,6 +104,8 @@ pub(super) struct Sums {
     weight: u32,
     /// `Σ w e²` (mm², Q8).
     cost: i64,
+    /// `Σ w e e′`, `e′` the residual of the point before (mm², Q8).
+    cross: i64,
 }
 
 /// Geman–McClure weights `(k²/(k² + e²))²` by the residual in 64 steps up to the gate, `k` 16 of them: Q8.
@@ -143,6 +145,7 @@ pub(super) fn run(
         return sums;
     };
     let projection = Projection::new(lines, at);
+    let mut before = 0;
     for chunk in points.chunks(BLOCK * stride) {
         let mut h = [0i32; 6];
         let mut b = [0i32; 3];
@@ -171,7 +174,10 @@ pub(super) fn run(
             b[1] += wy * e;
             b[2] += wt * e;
             sums.weight += w as u32;
-            sums.cost += i64::from(((w * e) >> 4) * (e >> 4));
+            let we = (w * e) >> 4;
+            sums.cost += i64::from(we * (e >> 4));
+            sums.cross += i64::from(we * before);
+            before = e >> 4;
         }
         for (sum, block) in sums.h.iter_mut().zip(h) {
             *sum += i64::from(block);
@@ -293,6 +299,15 @@ impl Sums {
     /// Sum of the weights.
     pub fn total_weight(&self) -> f32 {
         self.weight as f32 / 256.0
+    }
+
+    /// How alike the residuals of neighbouring points are, 0 to 0.9: where they share an error of the reference's
+    /// surface, they are worth fewer points than there are.
+    pub fn correlation(&self) -> f32 {
+        if self.cost <= 0 {
+            return 0.0;
+        }
+        math::max(0.0, math::min(0.9, self.cross as f32 / self.cost as f32))
     }
 
     /// Root of the weighted mean square residual (m).
