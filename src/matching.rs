@@ -38,6 +38,9 @@ pub struct Match {
     pub weak: Option<WeakDirection>,
     /// Starts tried: 1 where the guess was good enough.
     pub starts: u8,
+    /// What the best pose elsewhere is worth over what this one is: 0 where none was tried, near 1 where the scene looks
+    /// the same from two places.
+    pub rival: f32,
 }
 
 /// A direction of motion that leaves the match as good as before: along a corridor, about a round room's centre.

@@ -28,7 +28,8 @@ pub struct OdometryConfig {
     pub keyframe_turn: f32,
     /// A new keyframe is made when fewer than this share of the beams meet the last one's surfaces. Default 0.6.
     pub keyframe_overlap: f32,
-    /// A match that is farther than this from the guess is refused (m, and rad at twice its value). Default 0.4.
+    /// A match that explains every beam may be this far from the guess (m, and rad at twice its value), one that explains
+    /// half of them half as far. Default 0.45: wheels that slip or spin, not another room.
     pub max_correction: f32,
     /// Error of the guess, as a share of the distance and of the turn. Default 0.1.
     pub prior_error: f32,
@@ -47,7 +48,7 @@ impl OdometryConfig {
         keyframe_distance: 0.3,
         keyframe_turn: 0.35,
         keyframe_overlap: 0.6,
-        max_correction: 0.4,
+        max_correction: 0.45,
         prior_error: 0.1,
         max_refused: 3,
         icp: IcpConfig::DEFAULT,
@@ -209,7 +210,11 @@ impl<const N: usize> Odometry<N> {
 
         let predicted = self.pose * motion;
         let predicted_covariance = self.grown(motion);
-        let outcome = self.matched(predicted);
+        // Wheels that slip tell a wrong motion; to go on as before may then be the better guess.
+        let outcome = self.matched(predicted).or_else(|refusal| match self.wheels {
+            Some(_) => self.matched(self.pose * self.twist.over(seconds)).map_err(|_| refusal),
+            None => Err(refusal),
+        });
         let before = self.pose;
         match &outcome {
             Ok(found) => {
@@ -291,7 +296,8 @@ impl<const N: usize> Odometry<N> {
         .map_err(Refusal::NoMatch)?;
         let correction = guess.between(found.pose);
         let (distance, turn) = (correction.distance(), math::abs(correction.theta));
-        if distance > self.config.max_correction || turn > 2.0 * self.config.max_correction {
+        let most = self.config.max_correction * found.score;
+        if distance > most || turn > 2.0 * most {
             return Err(Refusal::TooFar { distance, turn });
         }
         Ok(found)

@@ -6,6 +6,7 @@ use crate::{
         MatchError,
         icp::{Search, Stepped, Task, pass::FixedPose},
     },
+    math,
 };
 
 /// A pose and what it is worth.
@@ -23,11 +24,15 @@ pub(super) struct Best {
     pub last: Stepped,
     /// Starts tried.
     pub starts: u8,
+    /// Worth of the best candidate elsewhere over that of the best.
+    pub ratio: f32,
 }
 
 /// A score at which the guess alone is believed, and one at which the starts next to it are.
 const SURE: f32 = 0.7;
 const LIKELY: f32 = 0.5;
+/// A second pose that is worth this share of the best makes the match ambiguous.
+const AMBIGUOUS: f32 = 0.95;
 /// What a start loses per square metre between its end and the guess: a guess is worth something.
 const NEAR_PULL: f32 = 2.5;
 const FAR_PULL: f32 = 0.5;
@@ -61,44 +66,89 @@ const GLOBAL: Ring = Ring {
     pull: GLOBAL_PULL,
 };
 
+/// Two candidates closer than this (m; a turn counted at 3 m) are the same pose, found twice.
+const SAME: f32 = 0.15;
+
+/// The candidates so far: the best one, and the best of those that are somewhere else.
+struct Race {
+    /// With its worth: the score less what its distance from the guess costs.
+    best: Result<(Candidate, f32), MatchError>,
+    rival: f32,
+    starts: u8,
+}
+
+impl Race {
+    fn enter(&mut self, found: Candidate, worth: f32) {
+        let Ok((best, best_worth)) = self.best else {
+            self.best = Ok((found, worth));
+            return;
+        };
+        let elsewhere = best.at.distance(found.at) > SAME;
+        if worth > best_worth {
+            self.best = Ok((found, worth));
+            if elsewhere {
+                self.rival = best_worth;
+            }
+        } else if elsewhere {
+            self.rival = math::max(self.rival, worth);
+        }
+    }
+
+    fn is_below(&self, limit: f32) -> bool {
+        !self.best.is_ok_and(|(best, _)| best.value >= limit)
+    }
+}
+
 /// Finds the best candidate: from the guess alone if that is sure, else from turned and moved starts.
 pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<Best, MatchError> {
-    let mut best = task.coarse(task.start, observe);
-    let mut starts = 1u8;
-    let below =
-        |limit: f32, best: &Result<Candidate, MatchError>| !best.is_ok_and(|b| b.value >= limit);
+    let mut race = Race {
+        best: Err(MatchError::Degenerate),
+        rival: 0.0,
+        starts: 1,
+    };
+    match task.coarse(task.start, observe) {
+        Ok(found) => race.enter(found, found.value),
+        Err(error) => race.best = Err(error),
+    }
     match task.config.search {
         Search::Local => {
-            if below(SURE, &best) {
-                best = around(task, best, &NEAR, &mut starts);
+            if race.is_below(SURE) {
+                around(task, &mut race, &NEAR);
             }
-            if below(LIKELY, &best) {
-                best = around(task, best, &FAR, &mut starts);
+            if race.is_below(LIKELY) {
+                around(task, &mut race, &FAR);
             }
         }
         Search::Global => {
-            if below(SURE, &best) {
-                best = around(task, best, &GLOBAL, &mut starts);
+            if race.is_below(SURE) {
+                around(task, &mut race, &GLOBAL);
             }
         }
     }
-    let last = task.fine(best?.at, observe)?;
+    let (best, worth) = race.best?;
+    let ratio = if worth > 0.0 { race.rival / worth } else { 1.0 };
+    // A guess that is worth something decides between two places; without one nothing does.
+    if ratio > AMBIGUOUS && task.config.search == Search::Global {
+        return Err(MatchError::Ambiguous { ratio });
+    }
+    let last = task.fine(best.at, observe)?;
     Ok(Best {
         candidate: task.judged(last.at),
         last,
-        starts,
+        starts: race.starts,
+        ratio,
     })
 }
 
-/// Lets the starts of a ring compete with the best so far.
-fn around(
-    task: &Task<'_>,
-    best: Result<Candidate, MatchError>,
-    ring: &Ring,
-    starts: &mut u8,
-) -> Result<Candidate, MatchError> {
-    let worth = |c: &Candidate| c.value - ring.pull * c.at.square_distance(task.start);
-    let mut best = best;
+/// Lets the starts of a ring compete.
+fn around(task: &Task<'_>, race: &mut Race, ring: &Ring) {
+    let worth = |c: &Candidate| {
+        let moved = c.at.distance_only(task.start);
+        c.value - ring.pull * moved * moved
+    };
+    if let Ok((best, old)) = &mut race.best {
+        *old = worth(best);
+    }
     for &turn in ring.turns {
         for (side, &ahead) in [1.0, -1.0]
             .into_iter()
@@ -108,19 +158,11 @@ fn around(
             if turn == 0 && (side < 0.0 || ahead == 0.0) {
                 continue;
             }
-            let start = task.start.moved_far([
-                ahead,
-                0.0,
-                side * f32::from(turn) * (core::f32::consts::PI / 180.0),
-            ]);
-            *starts = starts.saturating_add(1);
-            let Ok(found) = task.coarse(start, &mut |_| ()) else {
-                continue;
-            };
-            if !best.is_ok_and(|b| worth(&b) >= worth(&found)) {
-                best = Ok(found);
+            let turn = side * f32::from(turn) * (core::f32::consts::PI / 180.0);
+            race.starts = race.starts.saturating_add(1);
+            if let Ok(found) = task.coarse(task.start.moved_far([ahead, 0.0, turn]), &mut |_| ()) {
+                race.enter(found, worth(&found));
             }
         }
     }
-    best
 }

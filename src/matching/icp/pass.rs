@@ -55,13 +55,19 @@ impl FixedPose {
         }
     }
 
-    /// Square of the distance between two places (m²).
-    pub fn square_distance(self, other: Self) -> f32 {
+    /// Distance between the two places (m).
+    pub fn distance_only(self, other: Self) -> f32 {
         let (dx, dy) = (
             (self.x - other.x) as f32 / PER_METRE,
             (self.y - other.y) as f32 / PER_METRE,
         );
-        dx * dx + dy * dy
+        math::sqrt(dx * dx + dy * dy)
+    }
+
+    /// Distance between two poses (m), a turn counted at 3 m.
+    pub fn distance(self, other: Self) -> f32 {
+        let turn = math::abs(self.turn.wrapping_sub(other.turn) as i32 as f32 / PER_RADIAN);
+        self.distance_only(other) + 3.0 * turn
     }
 
     /// Moved by a step (m, m, rad), itself held within 0.5 m and 0.3 rad.

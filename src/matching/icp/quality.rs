@@ -91,6 +91,7 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         residual,
         weak,
         starts: best.starts,
+        rival: best.ratio,
     })
 }
 
