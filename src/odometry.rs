@@ -211,10 +211,14 @@ impl<const N: usize> Odometry<N> {
         let predicted = self.pose * motion;
         let predicted_covariance = self.grown(motion);
         // Wheels that slip tell a wrong motion; to go on as before may then be the better guess.
-        let outcome = self.matched(predicted).or_else(|refusal| match self.wheels {
-            Some(_) => self.matched(self.pose * self.twist.over(seconds)).map_err(|_| refusal),
-            None => Err(refusal),
-        });
+        let outcome = self
+            .matched(predicted)
+            .or_else(|refusal| match self.wheels {
+                Some(_) => self
+                    .matched(self.pose * self.twist.over(seconds))
+                    .map_err(|_| refusal),
+                None => Err(refusal),
+            });
         let before = self.pose;
         match &outcome {
             Ok(found) => {
