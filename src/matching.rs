@@ -36,6 +36,8 @@ pub struct Match {
     pub residual: f32,
     /// The direction that the scene hardly determines, if there is one.
     pub weak: Option<WeakDirection>,
+    /// Passes over the beams, of all starts.
+    pub iterations: u8,
     /// Starts tried: 1 where the guess was good enough.
     pub starts: u8,
     /// What the best pose elsewhere is worth over what this one is: 0 where none was tried, near 1 where the scene looks

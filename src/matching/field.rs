@@ -359,6 +359,8 @@ impl Sums {
             score: self.score(beams, scale.unexplored),
             weak,
             iterations,
+            starts: 1,
+            rival: 0.0,
         })
     }
 }

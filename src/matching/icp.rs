@@ -84,7 +84,7 @@ const SHORT: f32 = 1.0 / 16.0;
 const MEDIUM: f32 = 1.0 / 4.0;
 /// Gate and most of the passes over all points.
 const FINE: u8 = 5;
-const FINE_MOST: usize = 8;
+const FINE_MOST: u8 = 8;
 /// A step this short (m) ends the match.
 const CONVERGED: f32 = 0.003;
 
@@ -195,7 +195,9 @@ impl Task<'_> {
         let stride = self.coarse_stride();
         let mut at = start;
         let mut gate = COARSE_FIRST;
+        let mut passes = 0;
         for k in 0..COARSE_MOST {
+            passes += 1;
             let stepped = self.step(at, Pass { stride, gate }, k)?;
             at = stepped.at;
             observe(at.pose());
@@ -209,36 +211,36 @@ impl Task<'_> {
                 break;
             }
         }
-        Ok(self.judged(at))
+        Ok(self.judged(at, passes))
     }
 
-    /// Passes over all points until they move the pose no more.
+    /// Passes over all points until they move the pose no more; and how many.
     fn fine(
         &self,
         start: FixedPose,
         observe: &mut impl FnMut(Pose),
-    ) -> Result<Stepped, MatchError> {
+    ) -> Result<(Stepped, u8), MatchError> {
         let pass = Pass {
             stride: 1,
             gate: FINE,
         };
         let mut state = self.step(start, pass, 0)?;
-        for _ in 1..FINE_MOST {
-            observe(state.at.pose());
-            state = self.step(state.at, pass, 0)?;
-            if state.length < CONVERGED {
-                break;
-            }
-        }
         observe(state.at.pose());
-        Ok(state)
+        let mut passes = 1;
+        while passes < 2 || (passes < FINE_MOST && state.length >= CONVERGED) {
+            state = self.step(state.at, pass, 0)?;
+            observe(state.at.pose());
+            passes += 1;
+        }
+        Ok((state, passes))
     }
 
-    fn judged(&self, at: FixedPose) -> Candidate {
+    fn judged(&self, at: FixedPose, passes: u8) -> Candidate {
         let stride = usize::from(self.coarse_stride()).div_ceil(2);
         let score = score::judge(self.lines, self.points, at, stride);
         Candidate {
             at,
+            passes,
             value: score.value((20 / stride) as u16),
         }
     }

@@ -13,6 +13,8 @@ use crate::{
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Candidate {
     pub at: FixedPose,
+    /// Passes that led there.
+    pub passes: u8,
     /// See [`super::score::Score::value`].
     pub value: f32,
 }
@@ -75,10 +77,12 @@ struct Race {
     best: Result<(Candidate, f32), MatchError>,
     rival: f32,
     starts: u8,
+    passes: u8,
 }
 
 impl Race {
     fn enter(&mut self, found: Candidate, worth: f32) {
+        self.passes = self.passes.saturating_add(found.passes);
         let Ok((best, best_worth)) = self.best else {
             self.best = Ok((found, worth));
             return;
@@ -105,6 +109,7 @@ pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<
         best: Err(MatchError::Degenerate),
         rival: 0.0,
         starts: 1,
+        passes: 0,
     };
     match task.coarse(task.start, observe) {
         Ok(found) => race.enter(found, found.value),
@@ -131,9 +136,10 @@ pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<
     if ratio > AMBIGUOUS && task.config.search == Search::Global {
         return Err(MatchError::Ambiguous { ratio });
     }
-    let last = task.fine(best.at, observe)?;
+    let (last, passes) = task.fine(best.at, observe)?;
+    let iterations = race.passes.saturating_add(passes);
     Ok(Best {
-        candidate: task.judged(last.at),
+        candidate: task.judged(last.at, iterations),
         last,
         starts: race.starts,
         ratio,

@@ -90,6 +90,7 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         score: best.candidate.value,
         residual,
         weak,
+        iterations: best.candidate.passes,
         starts: best.starts,
         rival: best.ratio,
     })
