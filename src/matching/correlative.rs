@@ -264,6 +264,8 @@ impl<const N: usize> Correlator<N> {
                 sigma: math::sqrt(largest),
             }),
             iterations: 1,
+            starts: 1,
+            rival: 0.0,
         })
     }
 
