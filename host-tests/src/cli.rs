@@ -7,6 +7,7 @@ mod output;
 mod pairs;
 mod replay;
 mod simulate;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -33,6 +34,7 @@ enum Command {
     Decode(decode::Args),
     Bench(bench::Args),
     Card(card::Args),
+    Verify(verify::Args),
 }
 
 /// Exit status of a run that could not do its work: a bad file, a bad setting.
@@ -47,6 +49,7 @@ pub fn run() -> ExitCode {
         Some(Command::Pairs(args)) => pairs::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Card(args)) => card::run(&args),
+        Some(Command::Verify(args)) => verify::run(&args),
         Some(Command::Simulate(args)) => simulate::run(&args),
         None => simulate::run(&tool.simulate),
     };

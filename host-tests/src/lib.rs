@@ -3,6 +3,7 @@
 pub mod board;
 pub mod decode;
 pub mod encoder;
+pub mod golden;
 pub mod hash;
 pub mod matcher;
 pub mod picture;
@@ -10,5 +11,6 @@ pub mod pipeline;
 pub mod readers;
 pub mod recording;
 pub mod score;
+pub mod shared;
 pub mod sim;
 pub mod size;
