@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use beamfix::geometry::Pose;
-use host_tests::board::{BOARDS, Board, Replay};
+use host_tests::board::{BOARDS, Board, Replay, emulator::Count};
 use host_tests::golden::{self, Golden};
 use serde_json::{Value, json};
 
@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         for board in &boards {
             let bar = output::progress(here.len(), board.name);
             bar.tick();
-            let there = board.replay(&run.recording)?;
+            let there = board.replay(&run.recording, Count::None)?;
             bar.finish_and_clear();
             table.push(Row::new(run, board.name, &wanted, &poses(&there)));
         }
