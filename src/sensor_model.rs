@@ -1,9 +1,11 @@
 //! How likely a measurement is, seen from a pose in a map.
 
+pub mod beam_model;
 pub mod likelihood_field;
 
 use core::fmt;
 
+pub use beam_model::BeamModel;
 pub use likelihood_field::LikelihoodField;
 
 /// Why a model's numbers make no model.
