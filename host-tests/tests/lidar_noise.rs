@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use beamfix::lidar::{Packet, Protocol, ld06};
-use host_tests::encoder::{self, Echo, Encoder};
+use host_tests::encoder::{self, Echo, Encoder, damage};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -25,24 +25,6 @@ fn stream(sensor: &mut dyn Encoder, beams: usize) -> Vec<u8> {
     line
 }
 
-/// Damages the stream at `faults` places: in nine of ten a byte is deleted, doubled, flipped or inserted, in one a gap
-/// of 5 to 60 bytes is torn.
-fn damage(line: &mut Vec<u8>, faults: usize, rng: &mut ChaCha8Rng) {
-    for _ in 0..faults {
-        let at = rng.random_range(0..line.len() - 60);
-        if rng.random_range(0..10) == 0 {
-            drop(line.drain(at..at + rng.random_range(5..=60)));
-            continue;
-        }
-        match rng.random_range(0..4) {
-            0 => drop(line.remove(at)),
-            1 => line.insert(at, line[at]),
-            2 => line[at] ^= 1 << rng.random_range(0..8),
-            _ => line.insert(at, rng.random()),
-        }
-    }
-}
-
 /// Keeps the frames that are still whole, where a parser that drops a failed frame in one piece loses more.
 #[test]
 fn ld19_keeps_every_frame_that_400_faults_leave() {
@@ -52,7 +34,7 @@ fn ld19_keeps_every_frame_that_400_faults_leave() {
     let (mut kept_in_all, mut dropping_in_all, mut wrong) = (0, 0, 0);
     for seed in 0..8 {
         let mut line = clean.clone();
-        damage(&mut line, 400, &mut ChaCha8Rng::seed_from_u64(seed));
+        damage::hit(&mut line, 400, &mut ChaCha8Rng::seed_from_u64(seed));
         let whole = line.windows(47).filter(|window| sent.contains(window));
         let whole = whole.count();
 

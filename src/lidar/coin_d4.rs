@@ -12,7 +12,7 @@
 //! | 8 | XOR of the bytes at even offsets; at odd ones | without these two |
 //! | 10 + 3k | intensity; 2 flags and 14 bits of distance, 0 for none | `u8`; mm, `u16` LE |
 
-use super::packet::{Turns, divided, from_deg_q6};
+use super::packet::{Turns, divided, from_deg_q7};
 use super::timing::Pace;
 use super::{Model, Reading, Verdict, View};
 
@@ -58,8 +58,8 @@ impl super::Format for Format {
         let &[_, _, speed, count, a0, a1, b0, b1, _, _, ref body @ ..] = frame else {
             return None;
         };
-        let first = from_deg_q6(u16::from_le_bytes([a0, a1]).into()) >> 1;
-        let last = from_deg_q6(u16::from_le_bytes([b0, b1]).into()) >> 1;
+        let first = from_deg_q7(u16::from_le_bytes([a0, a1]).into());
+        let last = from_deg_q7(u16::from_le_bytes([b0, b1]).into());
         let step = divided(last.wrapping_sub(first), u32::from(count).saturating_sub(1));
         let mut samples = [0; 3 * MOST_SAMPLES];
         samples.get_mut(..body.len())?.copy_from_slice(body);

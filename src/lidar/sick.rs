@@ -110,9 +110,11 @@ impl super::Format for Format {
         };
         packet.first = from_cdeg(start_cdeg + 25 * u32::from(partial));
         packet.step = from_cdeg(step_cdeg);
-        // The mirror takes 13.3 ms a turn.
-        packet.view.period_q8 = step_cdeg * 3_413_333 / 36_000;
-        packet.view.first_us = pace.first_us(count, packet.view.period_q8, frame.len() as u16);
+        // The mirror takes 13.3 ms a turn; half degrees take two, quarter degrees four.
+        const DEGREE_Q8: u32 = 3_413_333 / 360;
+        let turns = 100 / step_cdeg as u16;
+        packet.view.period_q8 = DEGREE_Q8 / u32::from(turns);
+        packet.view.first_us = pace.first_us(360 * turns, DEGREE_Q8, frame.len() as u16);
         packet.view.turn_start = Some(0);
         Some(packet)
     }

@@ -2,6 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use beamfix::lidar::ld06::Parallax;
+use beamfix::lidar::{Family, Model};
+
 use super::{Echo, Encoder};
 
 /// Points of a frame.
@@ -57,8 +60,11 @@ pub struct Sensor {
     turns_per_s: f64,
     /// Where the first beam points, clockwise (turns).
     phase: f64,
+    parallax: Parallax,
     /// Beams measured.
     count: u64,
+    /// Distance of the last beam that had one, as sent (mm).
+    last_mm: f64,
     points: Vec<(u16, u8)>,
 }
 
@@ -66,19 +72,46 @@ impl Sensor {
     /// LD06: 4500 points and 10 turns a second.
     #[must_use]
     pub fn ld06() -> Self {
-        Self::new(4500.0, 10.0, 0.123)
+        Self::for_model(&Model::LD06)
     }
 
-    /// A sensor of the family; `phase` (turns) is where its first beam points, clockwise.
+    /// Any of the family.
     #[must_use]
-    pub fn new(points_per_s: f64, turns_per_s: f64, phase: f64) -> Self {
+    pub fn for_model(model: &Model) -> Self {
         Self {
-            points_per_s,
-            turns_per_s,
-            phase,
+            points_per_s: model.points_per_s.into(),
+            turns_per_s: f64::from(model.turns_per_10s) / 10.0,
+            phase: 0.123,
+            parallax: match model.family {
+                Family::Ldrobot(parallax) => parallax,
+                _ => Parallax::None,
+            },
             count: 0,
+            last_mm: 1500.0,
             points: Vec::new(),
         }
+    }
+
+    /// By how much (turns, clockwise) a beam looks beside the angle that is sent for it.
+    fn shift(&self) -> f64 {
+        let d = self.last_mm;
+        let angle = match self.parallax {
+            Parallax::None => 0.0,
+            Parallax::Ld14 => ((0.11923 * d - 18.975571) / (d + 5.9)).atan(),
+            Parallax::Lds02 => ((0.11923 * d - 20.14) / (d + 5.9)).atan(),
+        };
+        -angle / TAU
+    }
+
+    /// Distance as sent (mm) for one from the sensor's middle.
+    fn sent_mm(&self, range_mm: f64) -> f64 {
+        if self.parallax != Parallax::Lds02 {
+            return range_mm;
+        }
+        (0..20).fold(range_mm, |d, _| {
+            let y = 0.11923 * d - 20.14;
+            (range_mm * range_mm - y * y).max(0.0).sqrt() - 5.9
+        })
     }
 
     fn time_s(&self, beam: u64) -> f64 {
@@ -101,14 +134,14 @@ impl Encoder for Sensor {
     }
 
     fn fire(&mut self, look: &mut dyn FnMut(f64, f64) -> Option<Echo>, line: &mut Vec<u8>) {
-        let echo = look(self.next_time_us(), -self.angle(self.count) * TAU);
-        self.points.push(match echo {
-            Some(echo) => (
-                echo.range_mm.round().clamp(0.0, 65_535.0) as u16,
-                echo.intensity,
-            ),
-            None => (0, 0),
+        let angle = self.angle(self.count) + self.shift();
+        let echo = look(self.next_time_us(), -angle * TAU);
+        let point = echo.map_or((0, 0), |echo| {
+            let mm = self.sent_mm(echo.range_mm).round().clamp(0.0, 65_535.0);
+            self.last_mm = mm;
+            (mm as u16, echo.intensity)
         });
+        self.points.push(point);
         self.count += 1;
         let Ok(points) = <[(u16, u8); POINTS]>::try_from(&self.points[..]) else {
             return;

@@ -1,0 +1,242 @@
+//! What is encoded is what is decoded, for every model; and what damage does to it.
+
+use std::f64::consts::TAU;
+
+use beamfix::lidar::ld06::Parallax;
+use beamfix::lidar::ydlidar::Correction;
+use beamfix::lidar::{Family, Model, Packet, Protocol};
+use beamfix::scan::{Assembler, Beam};
+use host_tests::decode::{WithParser, with_parser};
+use host_tests::encoder::{self, Echo, damage};
+use proptest::prelude::*;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// A beam as it was measured.
+#[derive(Debug, Clone, Copy)]
+struct Fired {
+    time_us: f64,
+    bearing: f64,
+    echo: Option<Echo>,
+}
+
+/// Whether the angle depends on the distance.
+///
+/// The simulated sensor looks where the distance of the beam before would have it; near or behind a gap that is off by
+/// more than the format.
+fn triangulates(model: &Model) -> bool {
+    match model.family {
+        Family::Ldrobot(parallax) => parallax != Parallax::None,
+        Family::Ydlidar(samples) => samples.correction != Correction::None,
+        family => family == Family::RplidarUltra,
+    }
+}
+
+/// What a sensor measures in a smooth room with gaps, and what it sends.
+fn fire(model: &Model, beams: usize, seed: u64) -> (Vec<Fired>, Vec<u8>) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let phase = rng.random_range(0.0..TAU);
+    let nearest = f64::from(model.nearest_mm).max(if triangulates(model) { 1200.0 } else { 400.0 });
+    let farthest = f64::from(model.farthest_mm).min(7000.0);
+    let mut sensor = encoder::for_model(model);
+    let (mut fired, mut line) = (Vec::new(), Vec::new());
+    for _ in 0..beams {
+        let mut look = |time_us: f64, bearing: f64| {
+            let wave = 0.5 + 0.3 * (2.0 * bearing + phase).sin() + 0.1 * (5.0 * bearing).cos();
+            let range_mm = nearest + (farthest - nearest) * wave;
+            let intensity = rng.random_range(8..=255);
+            let echo = (rng.random_range(0..10) > 0).then_some(Echo {
+                range_mm,
+                intensity,
+            });
+            fired.push(Fired {
+                time_us,
+                bearing,
+                echo,
+            });
+            echo
+        };
+        sensor.fire(&mut look, &mut line);
+    }
+    (fired, line)
+}
+
+/// Beams of a stream, with the numbers of those that start a turn.
+struct Beams<'a>(&'a [u8]);
+
+impl WithParser for Beams<'_> {
+    type Output = (Vec<Beam>, Vec<usize>, u32);
+
+    fn run<P: Protocol>(self, mut parser: P) -> Self::Output {
+        let (mut beams, mut starts) = (Vec::new(), Vec::new());
+        for &byte in self.0 {
+            if let Some(packet) = parser.push(byte) {
+                starts.extend(packet.turn_start().map(|k| beams.len() + k));
+                beams.extend(packet.beams());
+            }
+        }
+        let counters = parser.counters();
+        (
+            beams,
+            starts,
+            counters.skipped_bytes + counters.check_errors,
+        )
+    }
+}
+
+/// Largest error of a range (mm) that the format itself makes.
+fn resolution(family: Family, mm: f64) -> f64 {
+    match family {
+        // Differences to distances that have lost up to 4 bits.
+        Family::RplidarUltra => 1.0 + mm / 500.0,
+        Family::RplidarUltraDense => 4.0,
+        Family::RplidarExpress => 2.0,
+        Family::Ydlidar(_) => 1.5,
+        Family::Ldrobot(_) => 1.1,
+        // Rounded to quarters, then to whole millimetres.
+        _ => 0.64,
+    }
+}
+
+fn check_model(model: &Model, seed: u64) {
+    let (fired, line) = fire(model, 2500, seed);
+    let (beams, starts, bad) = with_parser(model, Beams(&line));
+    let name = model.name;
+    assert_eq!(bad, 0, "{name}");
+    assert!(
+        beams.len() >= 2500 - 3 * 360,
+        "{name}: {} beams",
+        beams.len()
+    );
+    let (mut lost, mut is_first) = (0, true);
+    let offset = f64::from(beams[0].time_us) - fired[0].time_us;
+    for (k, (beam, fired)) in beams.iter().zip(&fired).enumerate() {
+        let late = f64::from(beam.time_us) - fired.time_us - offset;
+        // Half a millisecond each way is what a stamp can be off before pace and phase are learnt.
+        assert!(late.abs() < 1100.0, "{name} {k}: {late} µs late");
+        let Some(echo) = fired.echo else {
+            assert!(!beam.range.is_some(), "{name} {k}: {beam:?}");
+            continue;
+        };
+        let Ok(mm) = beam.range.mm() else {
+            lost += 1;
+            continue;
+        };
+        let off = (f64::from(mm) - echo.range_mm).abs();
+        assert!(
+            off <= resolution(model.family, echo.range_mm),
+            "{name} {k}: {mm} {echo:?}"
+        );
+        let bearing = f64::from(beam.bearing.0) / 65_536.0 * TAU;
+        let off = (bearing - fired.bearing + 1.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
+        let is_guess = std::mem::take(&mut is_first) && triangulates(model);
+        let allowed = if triangulates(model) { 0.2 } else { 0.06 };
+        let off = off.to_degrees().abs();
+        assert!(is_guess || off < allowed, "{name} {k}: {off}°");
+        let has_quality = !matches!(
+            model.family,
+            Family::RplidarExpress
+                | Family::RplidarDense
+                | Family::RplidarUltra
+                | Family::Scip(_)
+                | Family::Sick
+        ) && !matches!(model.family, Family::Ydlidar(samples) if samples.bytes == 2);
+        if has_quality {
+            let expected = match model.family {
+                Family::RplidarScan => echo.intensity >> 2,
+                _ => echo.intensity,
+            };
+            let coarse = if model.family == Family::RplidarUltraDense {
+                7
+            } else {
+                0
+            };
+            assert!(
+                beam.quality.abs_diff(expected) <= coarse,
+                "{name} {k}: {beam:?} {echo:?}"
+            );
+        }
+    }
+    // Ultra capsules cannot say a difference that is too large for ten bits.
+    let may_lose = if model.family == Family::RplidarUltra {
+        beams.len() / 20
+    } else {
+        0
+    };
+    assert!(lost <= may_lose, "{name}: {lost} lost");
+    // A turn starts where the sensor's own angle falls.
+    if !matches!(model.family, Family::Scip(_) | Family::Sick) {
+        let turns = beams.len() as f64 * f64::from(model.turns_per_10s)
+            / 10.0
+            / f64::from(model.points_per_s);
+        assert!(
+            (starts.len() as f64 - turns).abs() <= 1.5,
+            "{name}: {} of {turns}",
+            starts.len()
+        );
+    }
+}
+
+#[test]
+fn every_model_comes_back() {
+    for model in Model::ALL {
+        check_model(model, 1);
+    }
+}
+
+#[test]
+fn turns_fit_the_scan_that_the_model_asks_for() {
+    for model in Model::ALL {
+        let per_turn = usize::from(model.beams_per_turn);
+        let (_, line) = fire(model, 3 * per_turn + 400, 2);
+        let (beams, starts, _) = with_parser(model, Beams(&line));
+        let mut assembler = Box::new(Assembler::<3500>::new());
+        let mut longest = 0;
+        for (k, beam) in beams.iter().enumerate() {
+            if assembler.push(*beam, starts.contains(&k)) {
+                longest = longest.max(assembler.scan().len());
+            }
+        }
+        assert!(
+            longest > 0 && longest <= per_turn,
+            "{}: {longest} beams",
+            model.name
+        );
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+    #[test]
+    fn any_room_comes_back(seed in any::<u64>(), k in 0..Model::ALL.len()) {
+        check_model(&Model::ALL[k], seed);
+    }
+
+    #[test]
+    fn any_bytes_are_survived(
+        k in 0..Model::ALL.len(),
+        bytes in prop::collection::vec(
+            prop_oneof![
+                prop::sample::select(&[0x54u8, 0x2c, 0xaa, 0x55, 0xa5, 0x5a, 0xfa, 0xa0, 0x02, 0x80, 0x61, 0xad, 0x0a, b'M', b'D'][..]),
+                any::<u8>(),
+            ], 0..3000),
+    ) {
+        with_parser(&Model::ALL[k], Beams(&bytes));
+    }
+}
+
+#[test]
+fn express_capsules_keep_what_240_faults_leave() {
+    let (_, clean) = fire(&Model::RPLIDAR_EXPRESS, 1500 * 32, 3);
+    let mut all = 0;
+    for seed in 0..8 {
+        let mut line = clean.clone();
+        damage::hit(&mut line, 240, &mut ChaCha8Rng::seed_from_u64(seed));
+        all += with_parser(&Model::RPLIDAR_EXPRESS, Beams(&line)).0.len();
+    }
+    println!(
+        "of 1500 express capsules with 240 faults: {} points",
+        all / 8
+    );
+    assert!(all >= 8 * 34_784, "{all}");
+}
