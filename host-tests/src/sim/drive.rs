@@ -60,6 +60,9 @@ pub struct Drive {
     pub clearance: f64,
 }
 
+/// The robot stands that long before it drives off (s): its first scan is not bent by any motion.
+const STANDING: f64 = 1.0;
+
 /// Drives one round through the flat with `sensor` on board.
 #[must_use]
 pub fn drive(settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
@@ -74,7 +77,9 @@ pub fn drive(settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
         if now >= settings.seconds || robot.arrived() {
             break;
         }
-        robot.steer();
+        if now >= STANDING {
+            robot.steer();
+        }
         robot.read_wheels();
         let ends = f64::from(period) * PERIOD;
         while sensor.next_time_us() < ends * 1e6 {
