@@ -97,7 +97,11 @@ impl PairPicture {
             .iter()
             .copied()
             .chain(self.after.iter().map(|p| p.at));
-        let (low, high) = bounds(all);
+        let range = |p: &[f64; 2]| p[0].hypot(p[1]);
+        let ranges: Vec<f64> = all.clone().map(|p| range(&p)).collect();
+        // A few far points would make the rest small.
+        let most = 1.1 * quantile(&ranges, 0.92);
+        let (low, high) = bounds(all.filter(|p| range(p) < most));
         let (mut chart, limits) = metres(area, low, high, caption)?;
         for point in points {
             if let Some(foot) = point.foot {
