@@ -261,10 +261,14 @@ impl<const N: usize> Odometry<N> {
 
     /// Motion of the robot since the last scan by its wheels, else by going on as before.
     fn predicted_motion(&self, wheels: Option<Pose>, seconds: f32) -> Pose {
-        match (self.wheels, wheels.filter(|pose| pose.is_finite())) {
-            (Some(before), Some(now)) => before.between(now),
-            _ => self.twist.over(seconds),
-        }
+        // No robot drives farther between two scans: a damaged message.
+        const FARTHEST: f32 = 32.0;
+        let motion = |(before, now): (Pose, Pose)| before.between(now);
+        self.wheels
+            .zip(wheels)
+            .map(motion)
+            .filter(|motion| motion.is_finite() && motion.distance() < FARTHEST)
+            .unwrap_or_else(|| self.twist.over(seconds))
     }
 
     /// Covariance of the pose after a predicted motion.

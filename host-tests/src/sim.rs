@@ -8,7 +8,6 @@
 //! ```
 
 pub mod drive;
-pub mod home;
 pub mod lidar;
 pub mod noise;
 pub mod pose;

@@ -1,16 +1,15 @@
 //! What the firmware listens to besides the lidar.
 
 use beamfix::scan::{Beam, Bearing, Range};
-use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Most beams of one [`Command::Beams`].
-pub const BEAMS: usize = 12;
+pub const BEAMS: usize = 10;
 /// Most bytes of one [`Command::Lidar`].
-pub const LIDAR: usize = 128;
+pub const LIDAR: usize = 94;
 
-/// A message to the board.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// A message to the board. What is long stays where it was received: there is no room for it on a small stack.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Command<'a> {
     /// The robot's pose by its wheels, in a frame of their own; counts for the revolution that ends next.
     Wheels {
@@ -27,41 +26,33 @@ pub enum Command<'a> {
     Beams {
         /// Whether the first of them is the first of a revolution, which completes the one before.
         turn_starts: bool,
-        /// In the order of measurement.
-        beams: Vec<WireBeam, BEAMS>,
+        /// In the order of measurement, each as [`beam_bytes`].
+        beams: &'a [u8],
     },
     /// Asks for [`Health`](crate::telemetry::Health).
     Health,
 }
 
-/// A beam as it is sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct WireBeam {
-    bearing: u16,
-    /// 0 stands for no return, whatever the reason.
-    mm: u16,
-    time_us: u32,
-    quality: u8,
+/// A beam as it is sent: `u16` bearing, `u16` range (mm, 0 for none), `u32` time (µs), `u8` quality, little endian.
+#[must_use]
+pub fn beam_bytes(beam: &Beam) -> [u8; 9] {
+    let [b0, b1] = beam.bearing.0.to_le_bytes();
+    let [r0, r1] = beam.range.mm().unwrap_or(0).to_le_bytes();
+    let [t0, t1, t2, t3] = beam.time_us.to_le_bytes();
+    [b0, b1, r0, r1, t0, t1, t2, t3, beam.quality]
 }
 
-impl From<Beam> for WireBeam {
-    fn from(beam: Beam) -> Self {
-        Self {
-            bearing: beam.bearing.0,
-            mm: beam.range.mm().unwrap_or(0),
-            time_us: beam.time_us,
-            quality: beam.quality,
-        }
-    }
-}
-
-impl From<WireBeam> for Beam {
-    fn from(beam: WireBeam) -> Self {
-        Self {
-            bearing: Bearing(beam.bearing),
-            range: Range::from_mm(u32::from(beam.mm)),
-            time_us: beam.time_us,
-            quality: beam.quality,
-        }
-    }
+/// The beams of a [`Command::Beams`]; an incomplete one at the end is left out.
+pub fn beams(bytes: &[u8]) -> impl Iterator<Item = Beam> + '_ {
+    bytes.chunks_exact(9).filter_map(|beam| {
+        let &[b0, b1, r0, r1, t0, t1, t2, t3, quality] = beam else {
+            return None;
+        };
+        Some(Beam {
+            bearing: Bearing(u16::from_le_bytes([b0, b1])),
+            range: Range::from_mm(u16::from_le_bytes([r0, r1]).into()),
+            time_us: u32::from_le_bytes([t0, t1, t2, t3]),
+            quality,
+        })
+    })
 }

@@ -31,8 +31,9 @@ pub const VERSION: u8 = 1;
 /// Revolutions between two health messages.
 const HEALTH_EVERY: u16 = 16;
 
-/// Most beams of a revolution: an LD06 sends 450 at 10 Hz. Further ones are refused and counted.
-pub const BEAMS: usize = 456;
+/// Most beams of a revolution; further ones are refused and counted. An LD06 sends 450 at 10 Hz: the last 20 of a
+/// revolution are given up so that the stack fits into 16 KB of RAM too.
+pub const BEAMS: usize = 430;
 /// How the lidar sits on the robot, what is believed and what is not: change it here for all boards.
 pub const CONFIG: OdometryConfig = OdometryConfig::DEFAULT;
 
@@ -41,9 +42,16 @@ pub type Board = App<BEAMS>;
 
 /// What a board runs. N is the most beams a revolution may have.
 pub struct App<const N: usize> {
-    lidar: ld06::Parser,
+    lidar: Lidar,
     commands: link::Receiver,
     turns: Turns<N>,
+}
+
+/// From bytes to beams.
+struct Lidar {
+    parser: ld06::Parser,
+    /// Here rather than on the stack, where it would lie below a match.
+    packet: Option<ld06::Packet>,
 }
 
 /// From beams to frames.
@@ -55,7 +63,7 @@ struct Turns<const N: usize> {
     sequence: u16,
     bytes_lost: u32,
     health_due: bool,
-    out: Vec<u8, 192>,
+    out: Vec<u8, 128>,
 }
 
 impl<const N: usize> App<N> {
@@ -63,7 +71,10 @@ impl<const N: usize> App<N> {
     #[must_use]
     pub const fn new(config: OdometryConfig) -> Self {
         Self {
-            lidar: ld06::Parser::new(),
+            lidar: Lidar {
+                parser: ld06::Parser::new(),
+                packet: None,
+            },
             commands: link::Receiver::new(),
             turns: Turns {
                 assembler: Assembler::new(),
@@ -93,7 +104,7 @@ impl<const N: usize> App<N> {
     /// The byte that completes a revolution costs a match; a board must buffer what comes meanwhile.
     pub fn lidar(&mut self, byte: u8) -> &[u8] {
         self.turns.out.clear();
-        self.turns.lidar(&mut self.lidar, byte);
+        self.lidar.push(byte, &mut self.turns);
         self.health_when_due()
     }
 
@@ -107,12 +118,12 @@ impl<const N: usize> App<N> {
             }
             Some(Command::Lidar(bytes)) => {
                 for &byte in bytes {
-                    self.turns.lidar(&mut self.lidar, byte);
+                    self.lidar.push(byte, &mut self.turns);
                 }
             }
             Some(Command::Beams { turn_starts, beams }) => {
-                for (k, beam) in beams.into_iter().enumerate() {
-                    self.turns.beam(beam.into(), turn_starts && k == 0);
+                for (k, beam) in command::beams(beams).enumerate() {
+                    self.turns.beam(beam, turn_starts && k == 0);
                 }
             }
             Some(Command::Health) => self.turns.health_due = true,
@@ -136,7 +147,7 @@ impl<const N: usize> App<N> {
     /// How the parts are.
     #[must_use]
     pub fn health(&self) -> Health {
-        let lidar = self.lidar.counters();
+        let lidar = self.lidar.parser.counters();
         let commands = self.commands.counters();
         Health {
             packets: lidar.packets,
@@ -151,16 +162,19 @@ impl<const N: usize> App<N> {
     }
 }
 
-impl<const N: usize> Turns<N> {
-    fn lidar(&mut self, parser: &mut ld06::Parser, byte: u8) {
-        if let Some(packet) = parser.push(byte) {
+impl Lidar {
+    fn push<const N: usize>(&mut self, byte: u8, turns: &mut Turns<N>) {
+        self.packet = self.parser.push(byte);
+        if let Some(packet) = &self.packet {
             let start = packet.turn_start();
             for (k, beam) in packet.beams().enumerate() {
-                self.beam(beam, start == Some(k));
+                turns.beam(beam, start == Some(k));
             }
         }
     }
+}
 
+impl<const N: usize> Turns<N> {
     fn beam(&mut self, beam: Beam, turn_starts: bool) {
         if !self.assembler.push(beam, turn_starts) {
             return;

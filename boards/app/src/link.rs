@@ -10,7 +10,7 @@ use postcard::ser_flavors::Flavor;
 use serde::{Deserialize, Serialize};
 
 /// Most bytes of a message before framing.
-pub const MESSAGE: usize = 200;
+pub const MESSAGE: usize = 110;
 /// Most bytes of a frame: the check code adds two, COBS one, the end one.
 pub const FRAME: usize = MESSAGE + 4;
 

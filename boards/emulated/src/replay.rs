@@ -22,7 +22,7 @@ pub fn run<const N: usize>(
     let mut input = File::open(INPUT)?;
     let mut output = File::create(OUTPUT)?;
     output.write_all(app.ready())?;
-    let mut chunk = [0; 64];
+    let mut chunk = [0; 32];
     loop {
         let n = input.read(&mut chunk)?;
         let Some(bytes) = chunk.get(..n).filter(|bytes| !bytes.is_empty()) else {

@@ -43,9 +43,10 @@ impl Recording {
     /// A whole scan. It is matched when the next one starts.
     pub fn scan(&mut self, beams: &[Beam]) {
         for (k, piece) in beams.chunks(command::BEAMS).enumerate() {
+            let beams: Vec<u8> = piece.iter().flat_map(command::beam_bytes).collect();
             self.push(&Command::Beams {
                 turn_starts: k == 0,
-                beams: piece.iter().map(|&beam| beam.into()).collect(),
+                beams: &beams,
             });
         }
     }

@@ -241,11 +241,13 @@ fn three(run: &[ScanPoint], from: usize, point: &ScanPoint) -> Option<Laid> {
         nx * (i32::from(p.x) - i32::from(point.x)) + ny * (i32::from(p.y) - i32::from(point.y))
     };
     let (a, b, c) = (off(first), off(middle), off(last));
-    ((b - a).abs() < BENT_MM << 10).then_some(Laid {
+    let sum = a + b + c;
+    // One of the three is the point itself: on a straight line the sum is a few centimetres.
+    ((b - a).abs() < BENT_MM << 10 && sum.abs() < 1 << 22).then(|| Laid {
         nx,
         ny,
         // A third of the sum, in 1/16 mm.
-        offset: ((a + b + c) * 341 + (1 << 15)) >> 16,
+        offset: (sum * 341 + (1 << 15)) >> 16,
     })
 }
 
