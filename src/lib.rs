@@ -17,6 +17,7 @@ pub mod geometry;
 pub mod grid;
 pub mod lidar;
 pub mod linalg;
+pub mod localization;
 pub mod matching;
 pub mod math;
 pub mod odometry;

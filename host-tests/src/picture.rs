@@ -1,6 +1,8 @@
 //! Pictures: PNG and SVG that need no font and no library of the system.
 
+pub mod axes;
 pub mod map;
+pub mod pair;
 
 use std::path::Path;
 use std::sync::Once;
@@ -86,17 +88,4 @@ fn use_font() {
         let _ = register_font(FONT, FontStyle::Normal, dejavu::sans::regular());
         let _ = register_font(FONT, FontStyle::Bold, dejavu::sans::bold());
     });
-}
-
-/// Limits of a drawing in metres that give both axes the same scale in `size` pixels: x, then y.
-#[must_use]
-pub fn equal_axes(low: [f64; 2], high: [f64; 2], size: (u32, u32)) -> [std::ops::Range<f64>; 2] {
-    let pixels = [f64::from(size.0.max(1)), f64::from(size.1.max(1))];
-    let spans = [high[0] - low[0], high[1] - low[1]];
-    let scale = (spans[0] / pixels[0]).max(spans[1] / pixels[1]).max(1e-6) * 1.06;
-    std::array::from_fn(|k| {
-        let middle = 0.5 * (low[k] + high[k]);
-        let half = 0.5 * scale * pixels[k];
-        middle - half..middle + half
-    })
 }

@@ -8,6 +8,7 @@
 //! ```
 
 pub mod drive;
+pub mod home;
 pub mod lidar;
 pub mod noise;
 pub mod pose;

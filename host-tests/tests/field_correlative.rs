@@ -88,7 +88,7 @@ fn branch_and_bound_finds_what_trying_everything_finds() {
         let best = correlator
             .search(&pyramid, &points, &window, 0, None)
             .expect("something");
-        looked += correlator.take_lookups();
+        looked += correlator.lookups();
         all += 40
             * u64::from(window.headings.unsigned_abs())
             * u64::from(window.side.unsigned_abs()).pow(2);

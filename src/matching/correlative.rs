@@ -4,7 +4,7 @@
 //! guess. A pyramid of maxima bounds whole blocks of poses at once, and blocks that cannot win are left out.
 
 pub mod pyramid;
-pub mod rotated;
+pub(crate) mod rotated;
 
 use super::{Match, MatchError, WeakDirection};
 use crate::{
@@ -191,9 +191,10 @@ impl<const N: usize> Correlator<N> {
         }
     }
 
-    /// Bytes looked up since the last call, for measuring.
-    pub fn take_lookups(&mut self) -> u64 {
-        core::mem::take(&mut self.lookups)
+    /// Bytes looked up so far, for measuring.
+    #[must_use]
+    pub fn lookups(&self) -> u64 {
+        self.lookups
     }
 
     /// The best pose in the window around `guess`, to a cell and a step of the heading.

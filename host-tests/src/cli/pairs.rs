@@ -10,8 +10,9 @@ use beamfix::matching::icp::{IcpConfig, Search};
 use clap::ValueEnum;
 use host_tests::hash::PoseHash;
 use host_tests::matcher::Matcher;
+use host_tests::picture::{self, pair::PairPicture};
 use host_tests::readers::pairs::{self, Pairs};
-use host_tests::score::{Score, mean, quantile};
+use host_tests::score::{Score, error, is_right, mean, quantile};
 use host_tests::{size, sized};
 use serde_json::{Value, json};
 
@@ -30,6 +31,12 @@ pub struct Args {
     /// How far the guesses may be off: a few centimetres and degrees, or 40 cm and 45°, or there is none.
     #[arg(long, value_enum, default_value_t = Mode::Local)]
     mode: Mode,
+    /// Draw this pair of the list, before and after the match.
+    #[arg(long, value_name = "PAIR")]
+    picture: Option<i64>,
+    /// Where to draw it: pair-PAIR.png and pair-PAIR.svg.
+    #[arg(long, value_name = "DIR", default_value = "target/beamfix")]
+    pictures: PathBuf,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -52,6 +59,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         ..IcpConfig::DEFAULT
     };
     let size = size::fitting(list.scans.iter().map(|scan| &scan[..]));
+    if let Some(id) = args.picture {
+        sized!(size, draw(args, &list, &config, id))?;
+    }
     let (score, hash) = sized!(size, match_all(args, &list, &config))?;
     let levels: Vec<Value> = score
         .0
@@ -129,4 +139,54 @@ fn match_all<const N: usize>(
         out.flush().with_context(|| path.display().to_string())?;
     }
     Ok((score, hash))
+}
+
+/// Draws one pair.
+fn draw<const N: usize>(args: &Args, list: &Pairs, config: &IcpConfig, id: i64) -> Result<()> {
+    let pair = list
+        .pairs
+        .iter()
+        .find(|pair| pair.id == id)
+        .with_context(|| format!("--picture: there is no pair {id}"))?;
+    let mut matcher = Matcher::<N>::new();
+    let mut path = Vec::new();
+    let found = matcher.run(list, pair, config, |pose| path.push(pose));
+    let pose = found.as_ref().map_or(pair.guess, |found| found.pose);
+    let (metres, degrees) = error(pose, pair.truth);
+    let verdict = match &found {
+        Ok(found) => format!(
+            "{}: off by {:.1} mm, {:.3}°; {} inliers, residual {:.1} mm, score {:.2}",
+            if is_right((metres, degrees)) {
+                "right"
+            } else {
+                "WRONG"
+            },
+            1e3 * metres,
+            degrees,
+            found.inliers,
+            1e3 * found.residual,
+            found.score
+        ),
+        Err(error) => format!("refused: {error}"),
+    };
+    let name = args
+        .pairs
+        .file_name()
+        .map_or(String::new(), |name| name.to_string_lossy().into_owned());
+    let picture = PairPicture::new(
+        (
+            format!("pair {id} of {name}, level {}", pair.level),
+            verdict,
+        ),
+        (&matcher.reference_points, matcher.reference()),
+        &matcher.points,
+        (pair.guess, pair.truth),
+        found.ok().map(|found| (found.pose, found.covariance)),
+        path,
+    );
+    std::fs::create_dir_all(&args.pictures).with_context(|| args.pictures.display().to_string())?;
+    for ending in ["png", "svg"] {
+        picture::save(&picture, &args.pictures.join(format!("pair-{id}.{ending}")))?;
+    }
+    Ok(())
 }

@@ -1,10 +1,11 @@
 //! A map seen from above: walls, measured points, paths.
 
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::{Drawing, FONT, colour, equal_axes};
+use super::axes::{bounds, dots, header, line, metres};
+use super::{Drawing, colour};
 use crate::sim::World;
 
 /// A path with its name in the legend.
@@ -36,7 +37,6 @@ pub struct Map {
 }
 
 const WIDTH: u32 = 1500;
-const LABELS: (u32, u32) = (70, 50);
 const HEADER: u32 = 116;
 
 impl Map {
@@ -47,30 +47,34 @@ impl Map {
             .iter()
             .flat_map(|w| w.segments.iter().flat_map(|s| [s.from, s.to]));
         let seen: Vec<[f64; 2]> = corners.chain(self.points.iter().copied()).collect();
-        let driven = self
-            .paths
-            .iter()
-            .flat_map(|path| path.places.iter().copied());
-        let shown = if seen.is_empty() {
-            driven.collect()
-        } else {
-            seen
+        let driven = || {
+            self.paths
+                .iter()
+                .flat_map(|path| path.places.iter().copied())
         };
-        shown
-            .iter()
-            .fold(([0.0; 2], [0.5; 2]), |(low, high), place| {
-                (
-                    std::array::from_fn(|k| low[k].min(place[k])),
-                    std::array::from_fn(|k| high[k].max(place[k])),
-                )
-            })
+        if seen.is_empty() {
+            bounds(driven())
+        } else {
+            bounds(seen.into_iter())
+        }
+    }
+}
+
+impl Drawing for Map {
+    fn size(&self) -> (u32, u32) {
+        let (low, high) = self.limits();
+        let shape = (high[1] - low[1]) / (high[0] - low[0]).max(1e-6);
+        (
+            WIDTH,
+            (f64::from(WIDTH - 90) * shape.clamp(0.4, 1.1)) as u32 + 70 + HEADER,
+        )
     }
 
-    /// Names and colours of what is drawn, in one row.
-    fn legend<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()>
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()>
     where
         B::ErrorType: 'static,
     {
+        let (top, body) = area.split_vertically(HEADER);
         let walls = self.world.iter().map(|_| ("true walls", colour::INK, 2));
         let points = (!self.points.is_empty()).then_some((
             "measured points, placed by the estimate",
@@ -81,106 +85,46 @@ impl Map {
             .paths
             .iter()
             .map(|path| (path.name.as_str(), path.colour, path.width));
-        let mut x = LABELS.0 as i32;
-        for (name, colour, width) in walls.chain(points).chain(paths) {
-            let line = PathElement::new([(x, 96), (x + 30, 96)], colour.stroke_width(width));
-            area.draw(&line).map_err(fail)?;
-            area.draw_text(name, &ink(19), (x + 38, 86)).map_err(fail)?;
-            x += 38 + width_of(name) + 28;
+        let legend: Vec<_> = walls.chain(points).chain(paths).collect();
+        header(&top, 70, &self.title, &self.caption, &legend)?;
+
+        let (low, high) = self.limits();
+        let (mut chart, limits) = metres(&body, low, high, "")?;
+        dots(
+            &mut chart,
+            &limits,
+            self.points.iter().copied(),
+            1,
+            colour::POINTS.mix(0.35).filled(),
+        )?;
+        if let Some(world) = &self.world {
+            for face in &world.segments {
+                line(
+                    &mut chart,
+                    &limits,
+                    &[face.from, face.to],
+                    colour::INK.stroke_width(2),
+                )?;
+            }
+            for column in &world.circles {
+                line(
+                    &mut chart,
+                    &limits,
+                    &ring(column.centre, column.radius),
+                    colour::INK.stroke_width(2),
+                )?;
+            }
+        }
+        for path in &self.paths {
+            line(
+                &mut chart,
+                &limits,
+                &path.places,
+                path.colour.stroke_width(path.width),
+            )?;
         }
         Ok(())
     }
-}
-
-impl Drawing for Map {
-    fn size(&self) -> (u32, u32) {
-        let (low, high) = self.limits();
-        let shape = (high[1] - low[1]) / (high[0] - low[0]);
-        let plot = f64::from(WIDTH - LABELS.0) * shape.clamp(0.4, 1.1);
-        (WIDTH, plot as u32 + LABELS.1 + HEADER)
-    }
-
-    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()>
-    where
-        B::ErrorType: 'static,
-    {
-        let (width, height) = self.size();
-        let (low, high) = self.limits();
-        let plot = (width - LABELS.0 - 20, height - LABELS.1 - HEADER - 20);
-        let [x, y] = equal_axes(low, high, plot);
-        let inside = |p: &[f64; 2]| x.contains(&p[0]) && y.contains(&p[1]);
-        let (header, body) = area.split_vertically(HEADER);
-        header
-            .draw_text(&self.title, &ink(30), (LABELS.0 as i32, 12))
-            .map_err(fail)?;
-        header
-            .draw_text(&self.caption, &ink(21), (LABELS.0 as i32, 50))
-            .map_err(fail)?;
-        self.legend(&header)?;
-        let mut chart = ChartBuilder::on(&body)
-            .margin_right(20)
-            .margin_top(20)
-            .x_label_area_size(LABELS.1)
-            .y_label_area_size(LABELS.0)
-            .build_cartesian_2d(x.clone(), y.clone())
-            .map_err(fail)?;
-        chart
-            .configure_mesh()
-            .x_desc("x (m)")
-            .y_desc("y (m)")
-            .axis_desc_style(ink(20))
-            .label_style(ink(18))
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(RGBColor(228, 228, 228))
-            .x_labels(14)
-            .y_labels(10)
-            .draw()
-            .map_err(fail)?;
-        let dot = colour::POINTS.mix(0.35).filled();
-        let points = self
-            .points
-            .iter()
-            .filter(|p| inside(p))
-            .map(|p| Circle::new((p[0], p[1]), 1, dot));
-        chart.draw_series(points).map_err(fail)?;
-        let world = self.world.iter();
-        let faces = world
-            .clone()
-            .flat_map(|w| w.segments.iter().map(|s| vec![s.from, s.to]));
-        let round = world.flat_map(|w| w.circles.iter().map(|c| ring(c.centre, c.radius)));
-        for (line, colour, width) in faces.chain(round).map(|line| (line, colour::INK, 2)).chain(
-            self.paths
-                .iter()
-                .map(|path| (path.places.clone(), path.colour, path.width)),
-        ) {
-            // Piece by piece: long polylines cross themselves, which the bitmap backend fills badly.
-            let pieces = line
-                .windows(2)
-                .filter(|piece| piece.iter().all(inside))
-                .map(|piece| {
-                    PathElement::new(
-                        [(piece[0][0], piece[0][1]), (piece[1][0], piece[1][1])],
-                        colour.stroke_width(width),
-                    )
-                });
-            chart.draw_series(pieces).map_err(fail)?;
-        }
-        Ok(())
-    }
-}
-
-fn ink(size: u32) -> TextStyle<'static> {
-    (FONT, size).into_font().color(&colour::INK)
-}
-
-fn fail(error: impl std::fmt::Display) -> anyhow::Error {
-    anyhow!("drawing: {error}")
-}
-
-/// Width of a legend's text (pixels), near enough.
-fn width_of(text: &str) -> i32 {
-    let size = (FONT, 19).into_font().box_size(text);
-    size.map_or(10 * text.len() as i32, |(width, _)| width as i32)
 }
 
 /// A circle as a closed line.

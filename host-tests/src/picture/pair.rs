@@ -1,0 +1,318 @@
+//! A pair of scans before and after the match, and the estimate's way there.
+
+use anyhow::Result;
+use beamfix::geometry::Pose;
+use beamfix::linalg::Covariance;
+use beamfix::matching::icp::Reference;
+use beamfix::scan::{Points, ScanPoint};
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use super::axes::{bounds, dots, header, line, metres};
+use super::{Drawing, colour};
+use crate::score::quantile;
+use crate::sim::TruePose;
+
+/// A current point in the reference's frame, with the place on the reference's line that it is drawn to.
+#[derive(Debug, Clone, Copy)]
+struct Placed {
+    at: [f64; 2],
+    /// `None`: rejected.
+    foot: Option<[f64; 2]>,
+}
+
+/// What to draw.
+#[derive(Debug, Clone)]
+pub struct PairPicture {
+    title: String,
+    caption: String,
+    reference: Vec<[f64; 2]>,
+    before: Vec<Placed>,
+    after: Vec<Placed>,
+    guess: Pose,
+    truth: Pose,
+    found: Option<(Pose, Covariance)>,
+    path: Vec<Pose>,
+}
+
+/// Gate of the matcher's first pass (mm): a point farther from its line has no say.
+const FIRST_GATE: f64 = 1024.0;
+/// Gate of its last pass (mm).
+const LAST_GATE: f64 = 128.0;
+
+const SIZE: (u32, u32) = (1800, 1640);
+const HEADER: u32 = 120;
+const SCANS: u32 = 800;
+
+impl PairPicture {
+    /// A match from `guess` that showed the poses `path` on its way and found `found`, or nothing.
+    #[must_use]
+    pub fn new<const N: usize>(
+        (title, caption): (String, String),
+        (reference, lines): (&Points<N>, &Reference<N>),
+        current: &Points<N>,
+        (guess, truth): (Pose, Pose),
+        found: Option<(Pose, Covariance)>,
+        path: Vec<Pose>,
+    ) -> Self {
+        let end = found
+            .map(|(pose, _)| pose)
+            .or(path.last().copied())
+            .unwrap_or(guess);
+        let place = |pose: Pose, gate: f64| {
+            current
+                .as_slice()
+                .iter()
+                .map(|point| placed(lines, pose, point, gate))
+                .collect()
+        };
+        Self {
+            title,
+            caption,
+            reference: reference
+                .as_slice()
+                .iter()
+                .map(|p| metres_of(p.x, p.y))
+                .collect(),
+            before: place(guess, FIRST_GATE),
+            after: place(end, LAST_GATE),
+            guess,
+            truth,
+            found,
+            path,
+        }
+    }
+
+    fn scans<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, Shift>,
+        caption: &str,
+        points: &[Placed],
+    ) -> Result<()>
+    where
+        B::ErrorType: 'static,
+    {
+        let all = self
+            .reference
+            .iter()
+            .copied()
+            .chain(self.after.iter().map(|p| p.at));
+        let range = |p: &[f64; 2]| p[0].hypot(p[1]);
+        let ranges: Vec<f64> = all.clone().map(|p| range(&p)).collect();
+        // A few far points would make the rest small.
+        let most = 1.1 * quantile(&ranges, 0.92);
+        let (low, high) = bounds(all.filter(|p| range(p) < most));
+        let (mut chart, limits) = metres(area, low, high, caption)?;
+        for point in points {
+            if let Some(foot) = point.foot {
+                line(
+                    &mut chart,
+                    &limits,
+                    &[point.at, foot],
+                    colour::GREEN.stroke_width(1),
+                )?;
+            }
+        }
+        dots(
+            &mut chart,
+            &limits,
+            self.reference.iter().copied(),
+            4,
+            colour::BLUE.mix(0.45).filled(),
+        )?;
+        let (kept, rejected): (Vec<&Placed>, Vec<&Placed>) =
+            points.iter().partition(|p| p.foot.is_some());
+        dots(
+            &mut chart,
+            &limits,
+            kept.iter().map(|p| p.at),
+            2,
+            colour::RED.filled(),
+        )?;
+        dots(
+            &mut chart,
+            &limits,
+            rejected.iter().map(|p| p.at),
+            3,
+            colour::PURPLE.stroke_width(1),
+        )?;
+        dots(
+            &mut chart,
+            &limits,
+            [[0.0; 2]].into_iter(),
+            6,
+            colour::INK.filled(),
+        )
+    }
+
+    fn way<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, Shift>,
+        caption: &str,
+        near: bool,
+    ) -> Result<()>
+    where
+        B::ErrorType: 'static,
+    {
+        let xy = |pose: Pose| [f64::from(pose.x), f64::from(pose.y)];
+        let ellipse = self
+            .found
+            .map(|(pose, covariance)| ellipse(xy(pose), covariance));
+        let path: Vec<[f64; 2]> = [self.guess]
+            .into_iter()
+            .chain(self.path.iter().copied())
+            .map(xy)
+            .collect();
+        let (low, high) = if near {
+            let last = path.iter().rev().take(3).copied();
+            let (low, high) = bounds(ellipse.iter().flatten().copied().chain(last));
+            // At least a centimetre, so that nothing is drawn larger than it matters.
+            (
+                [low[0] - 0.002, low[1] - 0.002],
+                [high[0].max(low[0] + 0.01), high[1].max(low[1] + 0.01)],
+            )
+        } else {
+            bounds(path.iter().copied().chain([xy(self.truth)]))
+        };
+        let (mut chart, limits) = metres(area, low, high, caption)?;
+        // A long jump is another start of the search, not a step.
+        for step in path
+            .windows(2)
+            .filter(|step| near || (step[1][0] - step[0][0]).hypot(step[1][1] - step[0][1]) < 0.35)
+        {
+            line(
+                &mut chart,
+                &limits,
+                step,
+                colour::INK.mix(0.45).stroke_width(1),
+            )?;
+        }
+        dots(
+            &mut chart,
+            &limits,
+            path.iter().copied(),
+            3,
+            colour::INK.mix(0.6).filled(),
+        )?;
+        if let Some(ellipse) = &ellipse {
+            line(&mut chart, &limits, ellipse, colour::RED.stroke_width(2))?;
+        }
+        dots(
+            &mut chart,
+            &limits,
+            [xy(self.guess)].into_iter(),
+            7,
+            colour::ORANGE.filled(),
+        )?;
+        dots(
+            &mut chart,
+            &limits,
+            [xy(self.truth)].into_iter(),
+            8,
+            colour::GREEN.stroke_width(3),
+        )?;
+        let found = self.found.map(|(pose, _)| xy(pose));
+        dots(
+            &mut chart,
+            &limits,
+            found.into_iter(),
+            5,
+            colour::RED.filled(),
+        )
+    }
+}
+
+impl Drawing for PairPicture {
+    fn size(&self) -> (u32, u32) {
+        SIZE
+    }
+
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()>
+    where
+        B::ErrorType: 'static,
+    {
+        let (top, body) = area.split_vertically(HEADER);
+        let legend = [
+            ("reference", colour::BLUE, 6),
+            ("current, matched", colour::RED, 5),
+            ("rejected", colour::PURPLE, 5),
+            ("correspondence", colour::GREEN, 2),
+            ("guess", colour::ORANGE, 6),
+            ("passes", colour::INK, 3),
+            ("found, with 95 % ellipse", colour::RED, 3),
+            ("truth", colour::GREEN, 6),
+        ];
+        header(&top, 30, &self.title, &self.caption, &legend)?;
+        let (scans, ways) = body.split_vertically(SCANS);
+        let (left, right) = scans.split_horizontally(SIZE.0 / 2);
+        let matched = self.after.iter().filter(|p| p.foot.is_some()).count();
+        self.scans(&left, "at the guess", &self.before)?;
+        let after = format!(
+            "at the end: {matched} of {} points matched",
+            self.after.len()
+        );
+        self.scans(&right, &after, &self.after)?;
+        let (left, right) = ways.split_horizontally(SIZE.0 / 2);
+        self.way(
+            &left,
+            "the estimate after each pass (x, y of the current lidar)",
+            false,
+        )?;
+        self.way(&right, "the same, around the end", true)
+    }
+}
+
+/// Places a point with `pose` and finds its correspondence as the matcher does: the line that the reference saw in
+/// that direction, unless the weighted distance is beyond the gate.
+fn placed<const N: usize>(
+    lines: &Reference<N>,
+    pose: Pose,
+    point: &ScanPoint,
+    gate: f64,
+) -> Placed {
+    let [x, y] = metres_of(point.x, point.y);
+    let at = TruePose::from(pose).then(TruePose::new(x, y, 0.0));
+    let turn = libm::atan2(at.y, at.x) / core::f64::consts::TAU + 1.0;
+    let index = (turn * N as f64 + 0.5) as usize % N.max(1);
+    let foot = lines
+        .lines()
+        .get(index)
+        .filter(|line| line.is_some())
+        .and_then(|line| {
+            let (mx, my) = (f64::from(line.mx), f64::from(line.my));
+            let [qx, qy] = metres_of(line.qx, line.qy);
+            let (dx, dy) = (at.x - qx, at.y - qy);
+            let weighted_mm = (mx * dx + my * dy) / 1024.0 * 1000.0;
+            let along = (mx * dx + my * dy) / (mx * mx + my * my);
+            let near = dx.abs() < 8.0 && dy.abs() < 8.0;
+            (near && weighted_mm.abs() < gate).then_some([at.x - along * mx, at.y - along * my])
+        });
+    Placed {
+        at: [at.x, at.y],
+        foot,
+    }
+}
+
+fn metres_of(x: i16, y: i16) -> [f64; 2] {
+    [f64::from(x) * 1e-3, f64::from(y) * 1e-3]
+}
+
+/// The line that holds 95 % of the positions: 2.45 standard deviations.
+fn ellipse(centre: [f64; 2], covariance: Covariance) -> Vec<[f64; 2]> {
+    let (xx, xy, yy) = (
+        f64::from(covariance.0.xx),
+        f64::from(covariance.0.xy),
+        f64::from(covariance.0.yy),
+    );
+    // Cholesky: the unit circle becomes the ellipse.
+    let a = libm::sqrt(xx.max(0.0));
+    let b = if a > 0.0 { xy / a } else { 0.0 };
+    let c = libm::sqrt((yy - b * b).max(0.0));
+    (0..=72)
+        .map(|k| {
+            let angle = core::f64::consts::TAU * f64::from(k) / 72.0;
+            let (u, v) = (2.4477 * libm::cos(angle), 2.4477 * libm::sin(angle));
+            [centre[0] + a * u, centre[1] + b * u + c * v]
+        })
+        .collect()
+}

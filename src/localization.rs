@@ -1,0 +1,361 @@
+//! Where am I in a known map: tracking, finding oneself, noticing that one is lost.
+//!
+//! ```text
+//!            search done        one left
+//! Searching ────────────▶ Choosing ────▶ Tracking
+//!     ▲                      │ none fits    │ three bad scans
+//!     └──────────────────────┴──────────────┘
+//! ```
+//!
+//! Deterministic: no random particles. The search looks at every place and heading; what it finds is followed until
+//! the robot's motion has told the candidates apart. [`Localizer::update`] and [`Localizer::step`] do a bounded
+//! amount of work per call.
+
+pub mod hypotheses;
+pub mod quality;
+pub mod search;
+
+use crate::{
+    geometry::Pose,
+    matching::{
+        Match,
+        correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid, stride},
+        field::{self, FieldConfig},
+    },
+    math,
+    scan::ScanPoint,
+};
+use hypotheses::{Hypotheses, Hypothesis};
+use quality::Quality;
+use search::Search;
+
+/// When to believe what.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LocalizerConfig {
+    /// Below this quality a scan does not fit (0…1): see [`Quality::value`]. Default 0.45.
+    pub fits: f32,
+    /// So many scans in a row that do not fit: lost. Default 3.
+    pub patience: u8,
+    /// Mean quality from which on a candidate can be the pose. Default 0.55.
+    pub accept: f32,
+    /// And so much better than any other, summed over the scans. Default 0.25.
+    pub margin: f32,
+    /// And after so many scans. Default 2.
+    pub min_scans: u8,
+    /// After so many scans the search starts again if no candidate is accepted. Default 12.
+    pub max_scans: u8,
+    /// From one heading of the search to the next (rad). Default 0.0349: 2°.
+    pub turn_step: f32,
+    /// While tracking fails, the pose is looked for this far around the prediction (m). Default 0.4.
+    pub reach: f32,
+    /// And turned by this much (rad). Default 0.3.
+    pub turn: f32,
+    /// Matching while tracking.
+    pub field: FieldConfig,
+}
+
+impl LocalizerConfig {
+    /// For lidars that see all around, in rooms.
+    pub const DEFAULT: Self = Self {
+        fits: 0.45,
+        patience: 3,
+        accept: 0.55,
+        margin: 0.25,
+        min_scans: 2,
+        max_scans: 12,
+        turn_step: 0.0349,
+        reach: 0.4,
+        turn: 0.3,
+        field: FieldConfig::DEFAULT,
+    };
+}
+
+impl Default for LocalizerConfig {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// What is known after a scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Verdict {
+    /// The pose is known: the match, and how well the scan fits.
+    Tracking(Match, Quality),
+    /// The pose is predicted by odometry alone: this scan does not fit, but not enough in a row.
+    Doubtful(Quality),
+    /// The pose is not known: the search goes on in [`Localizer::step`].
+    Searching,
+    /// The pose is one of so many, and the best of them fits so well.
+    Choosing {
+        /// Candidates left.
+        candidates: u8,
+        /// Mean quality of the best.
+        best: f32,
+    },
+}
+
+/// The robot's place in a map that lies in flash.
+///
+/// 24·N bytes and about 4 KB, beside the pyramid's buffer: 8.7 KB for a map of 400 by 320 cells.
+/// N: points of a scan that are used where all are not needed, 96 to 128.
+#[derive(Debug, Clone)]
+pub struct Localizer<'a, const N: usize> {
+    pyramid: Pyramid<'a>,
+    config: LocalizerConfig,
+    correlator: Correlator<N>,
+    state: State,
+    /// While tracking.
+    pose: Pose,
+    bad_scans: u8,
+    search: Search<N>,
+    hypotheses: Hypotheses,
+    counters: Counters,
+}
+
+/// What happened so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Counters {
+    /// Scans given.
+    pub scans: u32,
+    /// Times the pose was lost.
+    pub lost: u32,
+    /// Searches begun.
+    pub searches: u32,
+    /// Bytes looked up by searches.
+    pub lookups: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// Waits for a scan to search with.
+    Lost,
+    Searching,
+    Choosing,
+    Tracking,
+}
+
+impl<'a, const N: usize> Localizer<'a, N> {
+    /// Knows nothing: the first scan starts a search.
+    #[must_use]
+    pub const fn new(pyramid: Pyramid<'a>, config: LocalizerConfig) -> Self {
+        Self {
+            pyramid,
+            config,
+            correlator: Correlator::new(),
+            state: State::Lost,
+            pose: Pose::IDENTITY,
+            bad_scans: 0,
+            search: Search::new(),
+            hypotheses: Hypotheses::new(),
+            counters: Counters {
+                scans: 0,
+                lost: 0,
+                searches: 0,
+                lookups: 0,
+            },
+        }
+    }
+
+    /// Tracks from a known pose of the lidar in the map on.
+    pub fn start_at(&mut self, map_from_lidar: Pose) {
+        self.pose = map_from_lidar;
+        self.bad_scans = 0;
+        self.state = if map_from_lidar.is_finite() {
+            State::Tracking
+        } else {
+            State::Lost
+        };
+    }
+
+    /// The lidar's pose in the map, where it is known.
+    #[must_use]
+    pub fn pose(&self) -> Option<Pose> {
+        (self.state == State::Tracking).then_some(self.pose)
+    }
+
+    /// What happened so far.
+    #[must_use]
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// Takes a scan; `motion` is the lidar's since the scan before, by odometry, in its own frame.
+    ///
+    /// Tracking costs what [`field::align`] costs, a scan that does not fit a search of [`LocalizerConfig::reach`]
+    /// around, choosing one short match a candidate.
+    pub fn update(&mut self, points: &[ScanPoint], motion: Pose) -> Verdict {
+        self.counters.scans = self.counters.scans.wrapping_add(1);
+        let motion = if motion.is_finite() {
+            motion
+        } else {
+            Pose::IDENTITY
+        };
+        match self.state {
+            State::Lost => {
+                self.hypotheses.clear();
+                if self.search.start(points) {
+                    self.counters.searches = self.counters.searches.wrapping_add(1);
+                    self.state = State::Searching;
+                }
+                Verdict::Searching
+            }
+            State::Searching => {
+                self.search.moved(motion);
+                Verdict::Searching
+            }
+            State::Choosing => self.choose(points, motion),
+            State::Tracking => self.track(points, motion),
+        }
+    }
+
+    /// Goes on with a search for about `budget` bytes looked up (3 instructions each on an M4F); true where there is
+    /// nothing more to do before the next scan.
+    ///
+    /// A call looks up at most `budget` bytes and then finishes the block that it is at: 12 000 bytes more.
+    pub fn step(&mut self, budget: u32) -> bool {
+        if self.state != State::Searching {
+            return true;
+        }
+        let before = self.search.lookups() + self.correlator_lookups();
+        loop {
+            let done = self.search.advance(
+                &self.pyramid,
+                &self.config,
+                &mut self.correlator,
+                &mut self.hypotheses,
+            );
+            let spent = self.search.lookups() + self.correlator_lookups() - before;
+            if done {
+                // Candidates are poses at the search's own scan: bring them to now.
+                self.hypotheses.moved(self.search.motion());
+                self.counters.lookups += spent;
+                self.state = if self.hypotheses.is_empty() {
+                    State::Lost
+                } else {
+                    State::Choosing
+                };
+                return true;
+            }
+            if spent >= u64::from(budget) {
+                self.counters.lookups += spent;
+                return false;
+            }
+        }
+    }
+
+    fn correlator_lookups(&self) -> u64 {
+        self.correlator.lookups()
+    }
+
+    fn track(&mut self, points: &[ScanPoint], motion: Pose) -> Verdict {
+        let predicted = self.pose * motion;
+        let field = *self.pyramid.field();
+        let fitting = |found: &Match| Quality::of(&field, points, found.pose, N);
+        let near = field::align(&field, points, predicted, &self.config.field).ok();
+        let mut best = near.map(|found| (found, fitting(&found)));
+        let fits = |best: &Option<(Match, Quality)>| {
+            best.is_some_and(|(_, q)| q.value() >= self.config.fits)
+        };
+        if !fits(&best) {
+            let around = CorrelativeConfig {
+                reach: self.config.reach,
+                turn: self.config.turn,
+                min_score: 0.2,
+                ..CorrelativeConfig::DEFAULT
+            };
+            let wide = self
+                .correlator
+                .align(&self.pyramid.local(), points, predicted, &around);
+            let wide =
+                wide.and_then(|wide| field::align(&field, points, wide.pose, &self.config.field));
+            if let Ok(found) = wide {
+                let quality = fitting(&found);
+                if best.is_none_or(|(_, before)| quality.value() > before.value()) {
+                    best = Some((found, quality));
+                }
+            }
+        }
+        if let Some((found, quality)) = best.filter(|_| fits(&best)) {
+            self.pose = found.pose;
+            self.bad_scans = 0;
+            return Verdict::Tracking(found, quality);
+        }
+        self.pose = predicted;
+        self.bad_scans += 1;
+        if self.bad_scans >= self.config.patience {
+            self.counters.lost = self.counters.lost.wrapping_add(1);
+            self.bad_scans = 0;
+            self.state = State::Lost;
+            // This scan will do for the search.
+            return self.update_lost(points);
+        }
+        Verdict::Doubtful(best.map_or(Quality::NONE, |(_, quality)| quality))
+    }
+
+    fn update_lost(&mut self, points: &[ScanPoint]) -> Verdict {
+        self.counters.scans = self.counters.scans.wrapping_sub(1);
+        self.update(points, Pose::IDENTITY)
+    }
+
+    fn choose(&mut self, points: &[ScanPoint], motion: Pose) -> Verdict {
+        let field = *self.pyramid.field();
+        let short = FieldConfig {
+            max_iterations: 8,
+            coarse_stride: 1,
+            min_share: 0.1,
+            translation_tolerance: 0.002,
+            rotation_tolerance: 0.001,
+            ..self.config.field
+        };
+        let some = Some(points)
+            .into_iter()
+            .flat_map(|points| points.iter().step_by(stride(points.len(), N)));
+        let some: heapless::Vec<ScanPoint, N> = some.copied().collect();
+        self.hypotheses.moved(motion);
+        self.hypotheses.weigh(|pose| {
+            let found = field::align(&field, &some, pose, &short);
+            let pose = found.map_or(pose, |found| found.pose);
+            (pose, Quality::of(&field, &some, pose, N).value())
+        });
+        let Some(best) = self.hypotheses.best() else {
+            self.state = State::Lost;
+            return Verdict::Searching;
+        };
+        let scans = best.scans;
+        let verdict = Verdict::Choosing {
+            candidates: self.hypotheses.len() as u8,
+            best: best.mean(),
+        };
+        if best.mean() < 0.6 * self.config.accept && scans >= 2 || scans >= self.config.max_scans {
+            self.state = State::Lost;
+            return verdict;
+        }
+        if scans < self.config.min_scans
+            || best.mean() < self.config.accept
+            || best.last < self.config.fits
+        {
+            return verdict;
+        }
+        if self.hypotheses.margin() < self.config.margin {
+            return verdict;
+        }
+        let Hypothesis { pose, .. } = best;
+        match field::align(&field, points, pose, &self.config.field) {
+            Ok(found) => {
+                self.pose = found.pose;
+                self.bad_scans = 0;
+                self.state = State::Tracking;
+                Verdict::Tracking(found, Quality::of(&field, points, found.pose, N))
+            }
+            Err(_) => verdict,
+        }
+    }
+}
+
+/// Whether two poses are the same place: within `metres` and `radians`.
+pub(crate) fn alike(a: Pose, b: Pose, metres: f32, radians: f32) -> bool {
+    let off = a.between(b);
+    off.distance() <= metres && math::abs(off.theta) <= radians
+}

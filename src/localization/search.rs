@@ -1,0 +1,244 @@
+//! The search for the pose over the whole map: every heading, every block of 4 by 4 cells, in bounded steps.
+
+use super::{
+    LocalizerConfig, alike,
+    hypotheses::{Hypotheses, Hypothesis, MOST},
+    quality::Quality,
+};
+use crate::{
+    geometry::{Point, Pose},
+    matching::{
+        correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid, rotated::Rotated, stride},
+        field::{self, FieldConfig},
+    },
+    math,
+    scan::ScanPoint,
+    sensor_model::likelihood_field::Field,
+};
+
+/// Cells on a side of the squares that the map is searched in.
+const SQUARE: i32 = 64;
+/// The pyramid's level whose blocks are tried, and their cells.
+const LEVEL: usize = 1;
+const BLOCK: i32 = 4;
+/// Beams that a block is tried with.
+const BEAMS: usize = 48;
+
+/// A search under way. 16·N + 500 bytes.
+#[derive(Debug, Clone)]
+pub(crate) struct Search<const N: usize> {
+    points: heapless::Vec<ScanPoint, N>,
+    few: heapless::Vec<ScanPoint, BEAMS>,
+    rotated: Rotated<BEAMS>,
+    /// What the robot moved since the scan.
+    motion: Pose,
+    stage: Stage,
+    /// Blocks kept, to be looked at closely.
+    blocks: Hypotheses,
+    lookups: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    /// The next heading and square.
+    Blocks { heading: u16, square: u16 },
+    /// The next block to be looked at closely.
+    Closely { next: usize },
+}
+
+impl<const N: usize> Search<N> {
+    pub const fn new() -> Self {
+        Self {
+            points: heapless::Vec::new(),
+            few: heapless::Vec::new(),
+            rotated: Rotated::new(),
+            motion: Pose::IDENTITY,
+            stage: Stage::Closely { next: MOST },
+            blocks: Hypotheses::new(),
+            lookups: 0,
+        }
+    }
+
+    /// Starts with a scan; false where it has too few points.
+    pub fn start(&mut self, points: &[ScanPoint]) -> bool {
+        if points.len() < 20 {
+            return false;
+        }
+        self.points.clear();
+        self.few.clear();
+        for point in points.iter().step_by(stride(points.len(), N)) {
+            let _ = self.points.push(*point);
+        }
+        for point in points.iter().step_by(stride(points.len(), BEAMS)) {
+            let _ = self.few.push(*point);
+        }
+        self.motion = Pose::IDENTITY;
+        self.stage = Stage::Blocks {
+            heading: 0,
+            square: 0,
+        };
+        self.blocks.clear();
+        true
+    }
+
+    pub fn moved(&mut self, motion: Pose) {
+        self.motion = self.motion * motion;
+    }
+
+    pub fn motion(&self) -> Pose {
+        self.motion
+    }
+
+    /// Bytes looked up so far.
+    pub fn lookups(&self) -> u64 {
+        self.lookups
+    }
+
+    /// The next square of blocks, or the next block closely; true where all is done.
+    pub fn advance(
+        &mut self,
+        pyramid: &Pyramid<'_>,
+        config: &LocalizerConfig,
+        correlator: &mut Correlator<N>,
+        found: &mut Hypotheses,
+    ) -> bool {
+        match self.stage {
+            Stage::Blocks { heading, square } => {
+                let shape = pyramid.field().shape();
+                let columns = u16::div_ceil(shape.width(), SQUARE as u16);
+                let rows = u16::div_ceil(shape.height(), SQUARE as u16);
+                let step = math::max(config.turn_step, 0.01);
+                let headings = math::round_to_i32(core::f32::consts::TAU / step).max(1);
+                self.square(
+                    pyramid,
+                    core::f32::consts::TAU * f32::from(heading) / headings as f32,
+                    i32::from(square % columns.max(1)) * SQUARE,
+                    i32::from(square / columns.max(1)) * SQUARE,
+                );
+                self.stage = if square + 1 < columns * rows {
+                    Stage::Blocks {
+                        heading,
+                        square: square + 1,
+                    }
+                } else if i32::from(heading) + 1 < headings {
+                    Stage::Blocks {
+                        heading: heading + 1,
+                        square: 0,
+                    }
+                } else {
+                    Stage::Closely { next: 0 }
+                };
+                false
+            }
+            Stage::Closely { next } => {
+                let Some(block) = self.blocks.as_slice().get(next) else {
+                    return true;
+                };
+                self.closely(pyramid, config, correlator, block.pose, found);
+                self.stage = Stage::Closely { next: next + 1 };
+                false
+            }
+        }
+    }
+
+    /// Tries the blocks of a square with one heading.
+    fn square(&mut self, pyramid: &Pyramid<'_>, heading: f32, x: i32, y: i32) {
+        let field = pyramid.field();
+        let shape = *field.shape();
+        let corner = |x: i32, y: i32| {
+            let place = shape.origin()
+                * Point::new(x as f32 * shape.resolution(), y as f32 * shape.resolution());
+            Pose::new(place.x, place.y, shape.origin().theta + heading)
+        };
+        // A hair inside the cell, so that rounding does not put the lidar into the one before.
+        let inside = 0.01 * shape.resolution();
+        let start =
+            corner(x, y) * Pose::new(0.0, 0.0, -heading) * Pose::new(inside, inside, heading);
+        if !self
+            .rotated
+            .assign(pyramid, &self.few, start, SQUARE as i16)
+        {
+            return;
+        }
+        let height = 1.0 / (255.0 * self.few.len() as f32);
+        for row in 0..SQUARE / BLOCK {
+            for quad in 0..SQUARE / BLOCK / 4 {
+                let first = 4 * quad;
+                let standing = |column: i32| {
+                    let (cx, cy) = (x + BLOCK * (first + column), y + BLOCK * row);
+                    [(0, 0), (2, 0), (0, 2), (2, 2)]
+                        .into_iter()
+                        .any(|(dx, dy)| free(field, (cx + dx + 1) as u32, (cy + dy + 1) as u32))
+                };
+                let standing = [0, 1, 2, 3].map(standing);
+                self.lookups += 16;
+                if standing == [false; 4] {
+                    continue;
+                }
+                let sums = self.rotated.row(pyramid, LEVEL, first as i16, row as i16);
+                self.lookups += 4 * self.few.len() as u64;
+                for ((sum, standing), column) in sums.into_iter().zip(standing).zip(first..) {
+                    let score = sum as f32 * height;
+                    if standing && score > self.blocks.worst() {
+                        let middle =
+                            corner(x + BLOCK * column + BLOCK / 2, y + BLOCK * row + BLOCK / 2);
+                        let block = Hypothesis {
+                            pose: middle,
+                            sum: score,
+                            last: score,
+                            scans: 1,
+                        };
+                        self.blocks.offer(block, 0.45, 0.11);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Finds the best pose in a block and keeps it as a candidate.
+    fn closely(
+        &mut self,
+        pyramid: &Pyramid<'_>,
+        config: &LocalizerConfig,
+        correlator: &mut Correlator<N>,
+        block: Pose,
+        found: &mut Hypotheses,
+    ) {
+        let around = CorrelativeConfig {
+            reach: 2.5 * pyramid.field().shape().resolution(),
+            turn: 1.2 * config.turn_step,
+            min_score: 0.05,
+            ..CorrelativeConfig::DEFAULT
+        };
+        let Ok(best) = correlator.align(&pyramid.local(), &self.points, block, &around) else {
+            return;
+        };
+        let short = FieldConfig {
+            max_iterations: 8,
+            coarse_stride: 1,
+            min_share: 0.1,
+            translation_tolerance: 0.002,
+            rotation_tolerance: 0.001,
+            ..config.field
+        };
+        let pose = match field::align(pyramid.field(), &self.points, best.pose, &short) {
+            Ok(fine) if alike(fine.pose, best.pose, 0.3, 0.1) => fine.pose,
+            _ => best.pose,
+        };
+        let quality = Quality::of(pyramid.field(), &self.points, pose, N).value();
+        let one = Hypothesis {
+            pose,
+            sum: quality,
+            last: quality,
+            scans: 1,
+        };
+        found.offer(one, 0.3, 0.2);
+    }
+}
+
+/// Whether a lidar can stand there: explored, and not within 1.5σ of a surface.
+fn free<F: Field + ?Sized>(field: &F, x: u32, y: u32) -> bool {
+    let byte = field.byte(x, y);
+    let surface = 255 - math::round_to_i32(math::min(1.125 / field.scale().step, 200.0)) as u8;
+    byte != field.scale().unexplored && byte < surface
+}
