@@ -164,8 +164,12 @@ impl PairPicture {
             .map(xy)
             .collect();
         let (low, high) = if near {
-            let last = path.iter().rev().take(3).copied();
-            let (low, high) = bounds(ellipse.iter().flatten().copied().chain(last));
+            // Around what was found, or where the search ended without finding anything.
+            let end: Vec<[f64; 2]> = match &ellipse {
+                Some(ellipse) => ellipse.iter().copied().chain([xy(self.truth)]).collect(),
+                None => path.iter().rev().take(3).copied().collect(),
+            };
+            let (low, high) = bounds(end.into_iter());
             // At least a centimetre, so that nothing is drawn larger than it matters.
             (
                 [low[0] - 0.002, low[1] - 0.002],
