@@ -12,6 +12,7 @@ pub mod camsense;
 pub mod coin_d4;
 pub mod delta;
 pub mod framing;
+pub mod identify;
 #[cfg(any(
     feature = "embedded-io",
     feature = "embedded-io-async",

@@ -74,6 +74,11 @@ pub struct Format {
 }
 
 impl Format {
+    /// How much of a turn a frame covers, as configured or as two frames in a row told.
+    pub fn sector(&self) -> Sector {
+        self.sector
+    }
+
     /// Angle that this frame covers: by its own fields, or by its distance from the one before.
     fn span_cdeg(&mut self, start: u16, end: Option<u16>) -> u32 {
         let from = |from: u16, to: u16| {

@@ -283,6 +283,24 @@ fn checked(line: &[u8]) -> Option<&[u8]> {
     (check_character(text) == *code).then_some(text)
 }
 
+/// Lines with a right check character, as frames of a stream.
+pub(super) fn survey(bytes: &[u8]) -> super::identify::Survey {
+    let mut survey = super::identify::Survey::default();
+    for line in bytes.split(|byte| *byte == b'\n') {
+        let text = line.strip_suffix(b"\r").unwrap_or(line);
+        if !(3..=66).contains(&text.len()) || !text.iter().all(|c| (0x20..0x7f).contains(c)) {
+            continue;
+        }
+        if checked(text).is_some() {
+            survey.frames += 1;
+            survey.covered_bytes += line.len() as u32 + 1;
+        } else {
+            survey.check_errors += 1;
+        }
+    }
+    survey
+}
+
 /// Check character of a line.
 #[must_use]
 pub fn check_character(text: &[u8]) -> u8 {
