@@ -3,8 +3,8 @@
 use std::fmt;
 
 use beamfix::lidar::{
-    Counters, Family, Model, Packet, Protocol, camsense, coin_d4, delta, ld06, lds01, rplidar,
-    scip, sick, xv11, ydlidar,
+    Counters, Family, Model, Packet, Protocol, camsense, coin_d4, delta, identify, ld06, lds01,
+    rplidar, scip, sick, xv11, ydlidar,
 };
 use beamfix::scan::Beam;
 
@@ -49,19 +49,46 @@ pub struct Summary {
     pub points: u32,
 }
 
-/// There is no sensor of this name.
+/// Why there is nothing to decode.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct UnknownLidar(pub String);
+pub enum DecodeError {
+    /// There is no sensor of this name.
+    UnknownLidar(String),
+    /// `auto`, and no sensor's frames are in the bytes.
+    NothingFits(Vec<String>),
+}
 
-impl fmt::Display for UnknownLidar {
+impl fmt::Display for DecodeError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Self(name) = self;
-        let known: Vec<&str> = names().collect();
-        write!(f, "unknown lidar '{name}'; known: {}", known.join(" "))
+        match self {
+            Self::UnknownLidar(name) => {
+                let known: Vec<&str> = names().collect();
+                write!(f, "unknown lidar '{name}'; known: {} auto", known.join(" "))
+            }
+            Self::NothingFits(hints) => write!(f, "auto: {}", hints.join("; ")),
+        }
     }
 }
 
-impl std::error::Error for UnknownLidar {}
+impl std::error::Error for DecodeError {}
+
+/// The model called `name`; for `auto`, the one that `bytes` are most likely from.
+pub fn model(name: &str, bytes: &[u8]) -> Result<&'static Model, DecodeError> {
+    if name != "auto" {
+        return Model::named(name).ok_or_else(|| DecodeError::UnknownLidar(name.into()));
+    }
+    // A second of the fastest line holds what there is to know.
+    let start = bytes.get(..100_000).unwrap_or(bytes);
+    match identify::identify(start) {
+        Some(finding) => Ok(finding.model),
+        None => {
+            let hints = identify::hints(&Model::LD06, start);
+            Err(DecodeError::NothingFits(
+                hints.map(|hint| hint.to_string()).collect(),
+            ))
+        }
+    }
+}
 
 /// What to do with a parser, whichever it is.
 pub trait WithParser {
@@ -94,13 +121,9 @@ pub fn with_parser<W: WithParser>(model: &Model, with: W) -> W::Output {
     }
 }
 
-/// Decodes `bytes` of the sensor called `name`; each measurement goes to `sink` in order.
-pub fn decode(
-    name: &str,
-    bytes: &[u8],
-    sink: &mut dyn FnMut(Row),
-) -> Result<Summary, UnknownLidar> {
-    let model = Model::named(name).ok_or_else(|| UnknownLidar(name.into()))?;
+/// Decodes `bytes` of the sensor called `name`, or of the one they are from for `auto`; each measurement goes to `sink` in order.
+pub fn decode(name: &str, bytes: &[u8], sink: &mut dyn FnMut(Row)) -> Result<Summary, DecodeError> {
+    let model = model(name, bytes)?;
     // A scanner that does not see all around counts to both sides.
     let is_signed = matches!(model.family, Family::Scip(_));
     let decoding = Decoding {

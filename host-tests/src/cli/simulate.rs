@@ -9,11 +9,14 @@ use anyhow::{Context, Result, bail};
 use beamfix::geometry::{Point, Pose};
 use beamfix::odometry::{Counters, OdometryConfig};
 use beamfix::scan::Mount;
+use host_tests::decode::{self, Summary};
 use host_tests::picture::{self, colour, map};
 use host_tests::pipeline::{Pipeline, places};
 use host_tests::readers::capture::{self, Turn};
 use host_tests::recording::Recording;
+use host_tests::sim::lidar::Ranging;
 use host_tests::sim::{self, Drive, Settings, TruePose};
+use host_tests::{encoder, size, sized};
 use serde_json::json;
 
 use super::output;
@@ -38,8 +41,8 @@ pub struct Args {
     json: bool,
 }
 
-/// Beams that a turn may have.
-const BEAMS: usize = beamfix_app::BEAMS;
+/// Most beams of a turn that are matched; of a finer sensor's, every second, third, …
+const MOST_BEAMS: usize = 1024;
 /// Every so many scans are drawn.
 const DRAWN: usize = 4;
 
@@ -56,15 +59,36 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if !(args.seconds > 0.0) {
         bail!("--seconds {}: must be above 0", args.seconds);
     }
+    let model = decode::model(&args.lidar, &[])?;
     fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     let settings = Settings {
         seed: args.seed,
         seconds: args.seconds,
+        ranging: Ranging {
+            nearest: f64::from(model.nearest_mm) * 1e-3,
+            farthest: f64::from(model.farthest_mm) * 1e-3,
+            ..Ranging::DEFAULT
+        },
         ..Settings::DEFAULT
     };
-    let mut sensor = host_tests::encoder::ld06::Sensor::ld06();
-    let drive = sim::drive(&settings, &mut sensor);
-    let (turns, summary) = capture::turns(&args.lidar, &drive.bytes)?;
+    let drive = sim::drive(&settings, encoder::for_model(model).as_mut());
+    let (mut turns, summary) = capture::turns(&args.lidar, &drive.bytes)?;
+    for turn in &mut turns {
+        let every = turn.beams.len().div_ceil(MOST_BEAMS).max(1);
+        turn.beams = turn.beams.iter().copied().step_by(every).collect();
+    }
+    let size = size::fitting(turns.iter().map(|turn| &turn.beams[..]));
+    sized!(size, follow(args, &settings, drive, &turns, &summary))
+}
+
+/// Follows the robot by what its lidar saw, with room for N beams a turn.
+fn follow<const N: usize>(
+    args: &Args,
+    settings: &Settings,
+    drive: Drive,
+    turns: &[Turn],
+    summary: &Summary,
+) -> Result<ExitCode> {
     let Some(origin) = turns.first().and_then(|turn| moment(&drive, turn)) else {
         bail!(
             "--seconds {}: not one whole turn of the lidar",
@@ -78,7 +102,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         },
         ..OdometryConfig::DEFAULT
     };
-    let mut pipeline = Pipeline::<BEAMS>::new(config);
+    let mut pipeline = Pipeline::<N>::new(config);
     let mut recording =
         Recording::create(&args.out.join("run.mcap"), &["estimate", "truth", "wheels"])?;
     let mut trajectory = output::create(&args.out.join("trajectory.txt"))?;
