@@ -7,17 +7,21 @@ use beamfix::scan::Beam;
 /// Beams a turn, smallest first.
 pub const SIZES: [usize; 4] = [360, 456, 720, 1024];
 
-/// The smallest of [`SIZES`] with room for these scans, the largest where none has.
+/// The smallest of [`SIZES`] with room for the usual one of these scans, the largest where none has.
 #[must_use]
 pub fn fitting<'a>(scans: impl Iterator<Item = &'a [Beam]>) -> usize {
-    let (mut longest, mut finest) = (0, 0);
+    let mut lengths = Vec::new();
+    let mut finest = 0;
     for scan in scans {
-        longest = longest.max(scan.len());
+        lengths.push(scan.len());
         if finest == 0 && scan.len() > 2 {
             finest = per_turn(scan);
         }
     }
-    let needed = longest.max(finest);
+    // The median: a turn whose start was lost in a damaged frame is twice as long as any other.
+    lengths.sort_unstable();
+    let usual = lengths.get(lengths.len() / 2).copied().unwrap_or(0);
+    let needed = usual.max(finest);
     let largest = SIZES[SIZES.len() - 1];
     SIZES
         .into_iter()

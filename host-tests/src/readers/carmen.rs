@@ -128,6 +128,7 @@ fn flaser<'a>(words: &[&'a str]) -> Result<Line<'a>> {
     let count = count(words, 1)?;
     let readings = readings(words, 2, count)?;
     let rest = 2 + count;
+    at_most(words, rest + 9)?;
     ensure!(count >= 2, "{count} readings");
     // 180 or 181 readings are 1° apart, 360 or 361 half a degree: 180° over the next lower even number.
     let step = core::f64::consts::PI / (count / 2 * 2) as f64;
@@ -153,6 +154,7 @@ fn robotlaser<'a>(words: &[&'a str]) -> Result<Line<'a>> {
     let readings = readings(words, 9, beams)?;
     let remissions = count(words, 9 + beams)?;
     let rest = 10 + beams + remissions;
+    at_most(words, rest + 14)?;
     Ok(Line {
         stamp: stamp(words, rest + 11)?,
         first,
@@ -194,6 +196,16 @@ fn word<'a>(words: &[&'a str], at: usize) -> Result<&'a str> {
         .get(at)
         .copied()
         .with_context(|| format!("{} words, at least {} wanted", words.len(), at + 1))
+}
+
+/// A line that is longer than it says has its readings and poses out of place.
+fn at_most(words: &[&str], count: usize) -> Result<()> {
+    ensure!(
+        words.len() <= count,
+        "{} words, at most {count} wanted",
+        words.len()
+    );
+    Ok(())
 }
 
 fn number(words: &[&str], at: usize) -> Result<f64> {
