@@ -12,6 +12,7 @@
 //! amount of work per call.
 
 pub mod hypotheses;
+pub mod presence;
 pub mod quality;
 pub mod search;
 

@@ -5,6 +5,7 @@
 pub mod correlative;
 pub mod field;
 pub mod icp;
+pub mod map;
 
 use core::fmt;
 

@@ -46,6 +46,17 @@ pub const fn is_free(byte: u8) -> bool {
     matches!(cell(byte), Cell::Free)
 }
 
+/// Makes each byte as sure as a byte can be of what it says: for maps that are to be compared or kept.
+pub fn decide(bytes: &mut [u8]) {
+    for byte in bytes {
+        *byte = match cell(*byte) {
+            Cell::Free => FREE,
+            Cell::Occupied => OCCUPIED,
+            Cell::Unknown => UNKNOWN,
+        };
+    }
+}
+
 /// What one look at a cell is worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct UpdateConfig {

@@ -91,7 +91,7 @@ fn part(end: i16, step: i32, range: u16) -> i16 {
 }
 
 /// Byte of a cell `sigmas` standard deviations from a surface.
-fn byte_at<F: Field + ?Sized>(field: &F, sigmas: f32) -> u8 {
+pub(super) fn byte_at<F: Field + ?Sized>(field: &F, sigmas: f32) -> u8 {
     let steps = 0.5 * sigmas * sigmas / field.scale().step;
     255 - crate::math::round_to_i32(crate::math::min(steps, 250.0)) as u8
 }
