@@ -23,3 +23,8 @@ pub mod math;
 pub mod odometry;
 pub mod scan;
 pub mod sensor_model;
+
+/// The README's example compiles.
+#[cfg(all(doctest, feature = "embedded-io"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -34,6 +34,22 @@ pub struct Card {
     pub rustc: String,
 }
 
+impl Card {
+    /// A row of the README's table.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        format!(
+            "| {} | {} | {} | {} | {} | {} |",
+            self.board,
+            self.flash_bytes,
+            self.ram_bytes,
+            self.stack_bytes,
+            self.instructions,
+            self.instructions_max
+        )
+    }
+}
+
 /// The drive that the cards are measured over: the first 20 s through the simulated flat.
 #[must_use]
 pub fn recording() -> Recording {
