@@ -14,7 +14,7 @@
 //! | [`sin_cos_q15`] | all bearings | 1.3 units in the last place (4e-5) | about 15 |
 //! | [`sin_cos_q15_fine`] | all angles | 1.7 units in the last place (5e-5) | about 40 |
 //! | [`atan2_turn`] | all but (0, 0) | 1.1 of 1/65536 turn (0.006°) | about 30 |
-//! | [`reciprocal`] | 128…32 767 | 0.5 % | about 12 |
+//! | [`reciprocal()`] | 128…32 767 | 0.5 % | about 12 |
 //! | [`rough_length`] | magnitudes to 2²⁸ | 3 % | about 12 |
 //! | [`isqrt`] | all `u32` | exact floor | about 120 |
 

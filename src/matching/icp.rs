@@ -4,8 +4,8 @@
 //!
 //! | stage | here | where |
 //! | --- | --- | --- |
-//! | selection | every k-th point while coarse, all at the end | [`Pass`](pass::Pass) |
-//! | matching | projection: the line that the reference saw in the point's direction | [`pass::Projection`] |
+//! | selection | every k-th point while coarse, all at the end | `pass::Pass` |
+//! | matching | projection: the line that the reference saw in the point's direction | `pass::Projection` |
 //! | weighting | noise of the range seen across the surface; Geman–McClure | `lines`, `pass` |
 //! | rejection | a gate that narrows | `pass` |
 //! | error metric | point to line | `pass` |
