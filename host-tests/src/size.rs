@@ -5,7 +5,7 @@
 use beamfix::scan::Beam;
 
 /// Beams a turn, smallest first.
-pub const SIZES: [usize; 4] = [360, 456, 720, 1024];
+pub const SIZES: [usize; 5] = [360, 456, 512, 720, 1024];
 
 /// The smallest of [`SIZES`] with room for the usual one of these scans, the largest where none has.
 #[must_use]
@@ -46,7 +46,8 @@ macro_rules! sized {
         match $size {
             ..=360 => $function::<360>($($argument),*),
             361..=456 => $function::<456>($($argument),*),
-            457..=720 => $function::<720>($($argument),*),
+            457..=512 => $function::<512>($($argument),*),
+            513..=720 => $function::<720>($($argument),*),
             _ => $function::<1024>($($argument),*),
         }
     };
@@ -63,6 +64,7 @@ mod tests {
             (180, 1.0f32, 360),
             (361, 0.5, 720),
             (450, 0.8, 456),
+            (500, 0.72, 512),
             (682, 0.351_562_5, 1024),
             (2000, 0.18, 1024),
         ] {

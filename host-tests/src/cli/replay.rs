@@ -67,9 +67,9 @@ enum Tier {
     /// 360 beams.
     #[value(name = "16k")]
     Small = 360,
-    /// 456 beams: an LD06.
+    /// 512 beams.
     #[value(name = "64k")]
-    Middle = 456,
+    Middle = 512,
     /// 720 beams.
     #[value(name = "192k")]
     Large = 720,

@@ -1,0 +1,179 @@
+//! Odometry over recorded logs, against relations that people checked by hand: `../shared`, where it exists.
+
+use std::path::Path;
+
+use beamfix::geometry::Pose;
+use beamfix::odometry::OdometryConfig;
+use beamfix::scan::Mount;
+use host_tests::pipeline::Pipeline;
+use host_tests::readers::{self, Log};
+use host_tests::score::{self, mean};
+use host_tests::sim::TruePose;
+use host_tests::{shared, size, sized};
+
+/// A scan's stamp (s) and where the robot was.
+type Placed = (f64, TruePose);
+
+fn replay<const N: usize>(log: &Log, wheels: bool) -> (Vec<Placed>, u32) {
+    let mount = Mount {
+        robot_from_lidar: log.robot_from_lidar,
+        ..Mount::DEFAULT
+    };
+    let mut pipeline = Pipeline::<N>::new(OdometryConfig {
+        mount,
+        ..OdometryConfig::DEFAULT
+    });
+    let track = log.scans.iter().map(|scan| {
+        let pose = pipeline
+            .step(&scan.beams, scan.wheels.filter(|_| wheels))
+            .pose;
+        (scan.stamp.parse().expect("a number"), pose.into())
+    });
+    (track.collect(), pipeline.counters().refused)
+}
+
+fn track(log: &Log, wheels: bool) -> (Vec<Placed>, u32) {
+    let size = size::fitting(log.scans.iter().map(|scan| &scan.beams[..]));
+    sized!(size, replay(log, wheels))
+}
+
+/// Mean errors (m, degrees) over the relations at most 10 s apart: what `tools/relations_eval.py` calls near.
+fn near_errors(mut track: Vec<Placed>, relations: &Path) -> (f64, f64, usize) {
+    track.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let at = |time: f64| {
+        let k = track.partition_point(|placed| placed.0 < time - 5e-4);
+        track
+            .get(k)
+            .filter(|placed| (placed.0 - time).abs() <= 5e-4)
+            .map(|placed| placed.1)
+    };
+    let text = std::fs::read_to_string(relations).expect("the relations");
+    let (mut metres, mut degrees) = (Vec::new(), Vec::new());
+    for line in text
+        .lines()
+        .filter(|line| !line.starts_with('#') && !line.trim().is_empty())
+    {
+        let words: Vec<f64> = line
+            .split_whitespace()
+            .map(|word| word.parse().expect("a number"))
+            .collect();
+        let [from, to, x, y, _, _, _, yaw] = words[..] else {
+            panic!("8 columns: {line}")
+        };
+        if (to - from).abs() > 10.0 {
+            continue;
+        }
+        let (a, b) = (
+            at(from).expect("a scan of that time"),
+            at(to).expect("a scan of that time"),
+        );
+        let off = TruePose::new(x, y, yaw).between(a.between(b));
+        metres.push(off.distance());
+        degrees.push(off.theta.to_degrees().abs());
+    }
+    (mean(&metres), mean(&degrees), metres.len())
+}
+
+#[test]
+fn drift_over_recorded_logs_stays_below_what_was_asked_for() {
+    //   log      scans   near relations  allowed (m, degrees)
+    for (name, scans, relations, allowed) in [
+        ("intel", 13_631, 1770, (0.016, 0.25)),
+        ("fr079", 4934, 987, (0.030, 0.45)),
+    ] {
+        let Some(path) = shared::file(&format!("datasets/logs/{name}.log.gz")) else {
+            continue;
+        };
+        let log = readers::read(&path).expect("the log");
+        assert_eq!(
+            (log.scans.len(), log.skipped, log.cut.is_none()),
+            (scans, 0, true),
+            "{name}"
+        );
+        let (track, refused) = track(&log, true);
+        let (metres, degrees, used) =
+            near_errors(track, &path.with_file_name(format!("{name}.relations")));
+        println!("{name}: {used} relations, {metres:.4} m, {degrees:.3}°, {refused} scans refused");
+        assert_eq!(used, relations, "{name}");
+        assert!(
+            metres <= allowed.0 && degrees <= allowed.1,
+            "{name}: {metres} m, {degrees}°, allowed {allowed:?}"
+        );
+    }
+}
+
+#[test]
+fn the_binary_copy_of_a_log_gives_the_same_beams_and_stamps() {
+    for name in ["intel", "fr079"] {
+        let Some(path) = shared::file(&format!("datasets/logs/{name}.log.gz")) else {
+            continue;
+        };
+        let text = readers::read(&path).expect("the log");
+        let binary =
+            readers::read(&path.with_file_name(format!("{name}.lscan"))).expect("its copy");
+        assert_eq!(text.scans.len(), binary.scans.len());
+        for (k, (a, b)) in text.scans.iter().zip(&binary.scans).enumerate() {
+            assert_eq!(a.beams.len(), b.beams.len(), "{name}, scan {k}");
+            let same = a
+                .beams
+                .iter()
+                .zip(&b.beams)
+                .all(|(a, b)| a.bearing == b.bearing && a.range.mm().ok() == b.range.mm().ok());
+            let stamps: [f64; 2] =
+                [&a.stamp, &b.stamp].map(|stamp| stamp.parse().expect("a number"));
+            assert!(
+                same && (stamps[0] - stamps[1]).abs() < 2e-6,
+                "{name}, scan {k} at {} and {}",
+                a.stamp,
+                b.stamp
+            );
+        }
+    }
+}
+
+#[test]
+fn low_cost_lidars_are_read_with_their_place_on_the_robot() {
+    //   log              scans beams  lidar ahead of the robot's middle (m)
+    for (name, scans, beams, ahead) in [
+        ("slambot-24jul14", 237, 360, -0.035),
+        ("slambot-6aug14", 3936, 360, -0.035),
+        ("tinyslam-exp2", 641, 682, 0.145),
+        ("tinyslam-exp3", 525, 682, 0.145),
+    ] {
+        let Some(path) = shared::file(&format!("datasets/lowcost/{name}.log.gz")) else {
+            continue;
+        };
+        let log = readers::read(&path).expect("the log");
+        let mount = log.robot_from_lidar;
+        assert_eq!(
+            (log.scans.len(), log.scans[0].beams.len(), log.skipped),
+            (scans, beams, 0),
+            "{name}"
+        );
+        assert!(
+            (mount.x - ahead).abs() < 1e-3 && mount.y.abs() < 1e-3 && mount.theta.abs() < 1e-3,
+            "{name}: {mount:?}"
+        );
+    }
+}
+
+#[test]
+fn a_real_capture_of_an_ld19_stands_still() {
+    let Some(path) = shared::file("datasets/serial/ld19-20240828.bin") else {
+        return;
+    };
+    let log = readers::capture::read(&path, "ld06").expect("the capture");
+    assert!(
+        (41..=43).contains(&log.scans.len()),
+        "{} turns",
+        log.scans.len()
+    );
+    let (track, _) = track(&log, false);
+    for (time, pose) in track {
+        let (metres, degrees) = score::error(Pose::from(pose), Pose::IDENTITY);
+        assert!(
+            metres < 0.01 && degrees < 0.5,
+            "at {time} s: {metres} m, {degrees}°"
+        );
+    }
+}
