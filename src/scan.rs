@@ -2,11 +2,13 @@
 
 pub mod assembler;
 pub mod beam;
+pub mod filter;
 pub mod mount;
 pub mod points;
 
 pub use assembler::Assembler;
 pub use beam::{Beam, Bearing, NoReturn, Range};
+pub use filter::FilterConfig;
 pub use mount::Mount;
 pub use points::{Points, PointsConfig, ScanPoint};
 
