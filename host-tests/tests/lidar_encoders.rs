@@ -65,14 +65,15 @@ fn fire(model: &Model, beams: usize, seed: u64) -> (Vec<Fired>, Vec<u8>) {
 struct Beams<'a>(&'a [u8]);
 
 impl WithParser for Beams<'_> {
-    type Output = (Vec<Beam>, Vec<usize>, u32);
+    type Output = (Vec<Beam>, Vec<usize>, u32, Option<f32>);
 
     fn run<P: Protocol>(self, mut parser: P) -> Self::Output {
-        let (mut beams, mut starts) = (Vec::new(), Vec::new());
+        let (mut beams, mut starts, mut speed) = (Vec::new(), Vec::new(), None);
         for &byte in self.0 {
             if let Some(packet) = parser.push(byte) {
                 starts.extend(packet.turn_start().map(|k| beams.len() + k));
                 beams.extend(packet.beams());
+                speed = packet.speed_rpm().or(speed);
             }
         }
         let counters = parser.counters();
@@ -80,6 +81,7 @@ impl WithParser for Beams<'_> {
             beams,
             starts,
             counters.skipped_bytes + counters.check_errors,
+            speed,
         )
     }
 }
@@ -100,7 +102,7 @@ fn resolution(family: Family, mm: f64) -> f64 {
 
 fn check_model(model: &Model, seed: u64) {
     let (fired, line) = fire(model, 2500, seed);
-    let (beams, starts, bad) = with_parser(model, Beams(&line));
+    let (beams, starts, bad, speed) = with_parser(model, Beams(&line));
     let name = model.name;
     assert_eq!(bad, 0, "{name}");
     assert!(
@@ -108,6 +110,10 @@ fn check_model(model: &Model, seed: u64) {
         "{name}: {} beams",
         beams.len()
     );
+    if let Some(rpm) = speed {
+        let sent = 6.0 * f32::from(model.turns_per_10s);
+        assert!((rpm - sent).abs() < 1.6, "{name}: {rpm} rpm, not {sent}");
+    }
     let (mut lost, mut is_first) = (0, true);
     let offset = f64::from(beams[0].time_us) - fired[0].time_us;
     for (k, (beam, fired)) in beams.iter().zip(&fired).enumerate() {
@@ -189,7 +195,7 @@ fn turns_fit_the_scan_that_the_model_asks_for() {
     for model in Model::ALL {
         let per_turn = usize::from(model.beams_per_turn);
         let (_, line) = fire(model, 3 * per_turn + 400, 2);
-        let (beams, starts, _) = with_parser(model, Beams(&line));
+        let (beams, starts, ..) = with_parser(model, Beams(&line));
         let mut assembler = Box::new(Assembler::<3500>::new());
         let mut longest = 0;
         for (k, beam) in beams.iter().enumerate() {

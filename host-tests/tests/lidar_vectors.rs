@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use beamfix::lidar::rplidar::command;
 use beamfix::lidar::{Family, Model, Packet, Protocol, delta, ld06, sick, ydlidar};
 use host_tests::decode::{self, WithParser, with_parser};
 use host_tests::encoder;
@@ -369,6 +370,60 @@ fn sick() {
             Some(&bytes[..]),
             "{id}"
         );
+    }
+}
+
+fn hex(vector: &Value, key: &str) -> Vec<u8> {
+    let text = vector[key].as_str().expect("hex");
+    let pairs = text.as_bytes().chunks(2);
+    pairs
+        .map(|pair| u8::from_str_radix(str::from_utf8(pair).expect("text"), 16).expect("hex"))
+        .collect()
+}
+
+#[test]
+fn rplidar_requests_and_answers() {
+    for vector in vectors("rplidar_commands") {
+        let id = vector["id"].as_str().expect("id");
+        let bytes = bytes(&vector);
+        if vector["kind"] == "command" {
+            let code = vector["expect"]["cmd"].as_u64().expect("cmd") as u8;
+            let payload = hex(&vector["expect"], "payload_hex");
+            let request = command::request(code, &payload);
+            assert_eq!(request.as_deref(), Some(&bytes[..]), "{id}");
+            continue;
+        }
+        let mut answers = command::Answers::new();
+        let answer = bytes.iter().find_map(|&byte| answers.push(byte)).expect(id);
+        let expect = &vector["expect"]["decoded"];
+        let number = |key: &str| expect[key].as_u64().expect("number");
+        match id {
+            "a1m8-get-info" => {
+                let info = command::Info::from_answer(&answer).expect(id);
+                let (major, minor) = info.firmware;
+                assert_eq!(
+                    format!("{major}.{minor}"),
+                    expect["firmware"].as_str().expect("text")
+                );
+                assert_eq!(u64::from(info.model), number("model"));
+                assert_eq!(u64::from(info.hardware), number("hardware"));
+                assert_eq!(info.serial[..], hex(expect, "serial_hex"));
+            }
+            _ => {
+                let health = command::Health::from_answer(&answer).expect(id);
+                assert_eq!(u64::from(health.status), number("status"));
+                assert_eq!(u64::from(health.code), number("error_code"));
+            }
+        }
+    }
+    for vector in vectors("ydlidar") {
+        if vector["id"] == "tmini-info" {
+            let mut answers = command::Answers::new();
+            let answer = bytes(&vector).iter().find_map(|&byte| answers.push(byte));
+            let info = answer.and_then(|answer| command::Info::from_answer(&answer));
+            let model = info.map(|info| u64::from(info.model));
+            assert_eq!(model, vector["expect"]["model"].as_u64());
+        }
     }
 }
 

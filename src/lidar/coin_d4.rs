@@ -123,6 +123,10 @@ impl super::Packet for Packet {
         &self.view
     }
 
+    fn speed_rpm(&self) -> Option<f32> {
+        self.speed_dhz.map(|speed| f32::from(speed) * 6.0)
+    }
+
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
         let samples = self.samples.get(..usize::from(self.bytes)).unwrap_or(&[]);
         let mut angle = self.first;

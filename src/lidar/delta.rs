@@ -239,6 +239,10 @@ impl super::Packet for Packet {
         &self.view
     }
 
+    fn speed_rpm(&self) -> Option<f32> {
+        Some(f32::from(self.speed_q05) * 3.0)
+    }
+
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
         let points = self.points.get(..usize::from(self.bytes)).unwrap_or(&[]);
         let mut angle = self.first;

@@ -215,6 +215,10 @@ impl super::Packet for Packet {
         &self.view
     }
 
+    fn speed_rpm(&self) -> Option<f32> {
+        Some(f32::from(self.speed_deg_per_s) / 6.0)
+    }
+
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
         let mut angle = self.start;
         let mut shift = self.shift;

@@ -113,6 +113,10 @@ impl super::Packet for Packet {
         &self.view
     }
 
+    fn speed_rpm(&self) -> Option<f32> {
+        Some(f32::from(self.speed_drpm) / 10.0)
+    }
+
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
         let mut angle = self.first;
         self.points.chunks_exact(6).map(move |point| {

@@ -119,6 +119,11 @@ pub trait Packet {
         })
     }
 
+    /// Speed of the motor (rpm), where the frame tells.
+    fn speed_rpm(&self) -> Option<f32> {
+        None
+    }
+
     /// Number of the beam that is the first of a new turn, if one is among them.
     fn turn_start(&self) -> Option<usize> {
         self.view().turn_start.map(usize::from)

@@ -129,6 +129,10 @@ impl super::Packet for Packet {
         &self.view
     }
 
+    fn speed_rpm(&self) -> Option<f32> {
+        Some(f32::from(self.speed_rpm_q6) / 64.0)
+    }
+
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
         readings(self.first, &self.points)
     }

@@ -232,6 +232,12 @@ impl super::Packet for Packet {
         &self.view
     }
 
+    fn speed_rpm(&self) -> Option<f32> {
+        self.speed_dhz
+            .filter(|speed| *speed != 0)
+            .map(|speed| f32::from(speed) * 6.0)
+    }
+
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
         let bytes = self.samples.get(..usize::from(self.bytes)).unwrap_or(&[]);
         let mut angle = self.first;
