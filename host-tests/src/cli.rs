@@ -7,6 +7,7 @@ mod output;
 mod pairs;
 mod replay;
 mod simulate;
+mod track;
 mod verify;
 
 use std::process::ExitCode;

@@ -1,6 +1,7 @@
 //! Pictures: PNG and SVG that need no font and no library of the system.
 
 pub mod axes;
+pub mod chart;
 pub mod map;
 pub mod pair;
 
@@ -19,6 +20,8 @@ pub const FONT: &str = "sans-serif";
 
 /// Colours that stay apart on white, also for the colour-blind (Okabe and Ito).
 pub mod colour {
+    /// A colour.
+    pub type Colour = super::RGBColor;
     use super::RGBColor;
 
     /// Walls and text.

@@ -385,6 +385,8 @@ fn the_default_run_writes_its_files_and_repeats_itself() {
     assert_ne!(first["pose_hash"], other["pose_hash"]);
     let map = image::open(dir.join("map.png")).expect("a picture");
     assert!(map.width() > 1000 && map.height() > 600);
+    let chart = fs::read_to_string(dir.join("errors.svg")).expect("a chart");
+    assert!(chart.starts_with("<svg") && chart.trim_end().ends_with("</svg>"));
     let recording = fs::read(dir.join("run.mcap")).expect("a recording");
     let messages = mcap::MessageStream::new(&recording).expect("an MCAP file");
     let scans = first["scans"].as_u64().expect("a number");

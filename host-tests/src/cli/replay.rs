@@ -10,12 +10,15 @@ use beamfix::odometry::{Counters, OdometryConfig};
 use beamfix::scan::Mount;
 use clap::ValueEnum;
 use host_tests::hash::PoseHash;
+use host_tests::picture;
 use host_tests::pipeline::Pipeline;
 use host_tests::readers::{self, Log, capture};
+use host_tests::sim::TruePose;
 use host_tests::{size, sized};
 use serde_json::json;
 
 use super::output;
+use super::track::{At, Track};
 
 /// Run the firmware's pipeline over a recorded log: CARMEN .log, .lscan, or a raw serial capture; packed or not.
 #[derive(clap::Args)]
@@ -37,6 +40,9 @@ pub struct Args {
     /// Where to write a line `timestamp x y theta` for every scan.
     #[arg(long, value_name = "FILE")]
     trajectory: Option<PathBuf>,
+    /// Draw what was seen and driven into this file, PNG or SVG by its ending.
+    #[arg(long, value_name = "FILE")]
+    map: Option<PathBuf>,
     /// The lidar's place on the robot (m, m, deg), where the log does not tell or tells it wrong.
     #[arg(long, value_name = "X,Y,DEG", value_parser = mount, allow_hyphen_values = true)]
     mount: Option<Pose>,
@@ -77,6 +83,9 @@ enum Tier {
     #[value(name = "512k")]
     Huge = 1024,
 }
+
+/// About so many scans are drawn into a map.
+const DRAWN: usize = 400;
 
 /// What a replay came to.
 struct Outcome {
@@ -150,15 +159,45 @@ fn replay<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
         .map_or(log.scans.len(), |most| most.min(log.scans.len()));
     let bar = output::progress(count, "replaying");
     let mut last = Pose::IDENTITY;
+    let mut track = Track::new(
+        TruePose::default(),
+        robot_from_lidar,
+        (count / DRAWN).max(1),
+    );
+    let start = log.scans.first().and_then(|scan| scan.wheels);
     for scan in &log.scans[..count] {
         let wheels = scan.wheels.filter(|_| args.prior == Prior::Odometry);
         last = pipeline.step(&scan.beams, wheels).pose;
         if let Some(file) = &mut trajectory {
             writeln!(file, "{} {} {} {}", scan.stamp, last.x, last.y, last.theta)?;
         }
+        if args.map.is_some() {
+            let us = scan.beams.last().map_or(0, |beam| beam.time_us);
+            let wheels = start
+                .zip(scan.wheels)
+                .map(|(start, now)| start.between(now));
+            let at = At {
+                time: f64::from(us) * 1e-6,
+                estimate: last,
+                truth: None,
+                wheels,
+            };
+            track.push(at, &scan.beams);
+        }
         bar.inc(1);
     }
     bar.finish_and_clear();
+    if let Some(path) = &args.map {
+        let name = args
+            .log
+            .file_name()
+            .map_or(String::new(), |name| name.to_string_lossy().into_owned());
+        let caption = format!("{count} scans, pose hash {}", pipeline.hash);
+        picture::save(
+            &track.map(format!("beamfix: odometry over {name}"), caption, None),
+            path,
+        )?;
+    }
     if let Some(mut file) = trajectory {
         file.flush()?;
     }

@@ -6,25 +6,26 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
-use beamfix::geometry::{Point, Pose};
+use beamfix::geometry::Pose;
 use beamfix::odometry::{Counters, OdometryConfig};
 use beamfix::scan::Mount;
 use host_tests::decode::{self, Summary};
-use host_tests::picture::{self, colour, map};
-use host_tests::pipeline::{Pipeline, places};
+use host_tests::picture;
+use host_tests::pipeline::Pipeline;
 use host_tests::readers::capture::{self, Turn};
 use host_tests::recording::Recording;
 use host_tests::sim::lidar::Ranging;
-use host_tests::sim::{self, Drive, Settings, TruePose};
+use host_tests::sim::{self, Drive, Settings};
 use host_tests::{encoder, size, sized};
 use serde_json::json;
 
 use super::output;
+use super::track::{At, Track};
 
 /// Drive a simulated robot through a flat: ray casting, lidar bytes, driver, matcher, pose.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Where to write map.png, trajectory.txt, truth.txt, run.mcap.
+    /// Where to write map.png, errors.svg, trajectory.txt, truth.txt, run.mcap.
     #[arg(long, value_name = "DIR", default_value = "target/beamfix")]
     out: PathBuf,
     /// Seed of all randomness.
@@ -33,7 +34,7 @@ pub struct Args {
     /// The lidar on board.
     #[arg(long, value_name = "MODEL", default_value = "ld06")]
     lidar: String,
-    /// Stop after so many seconds; the round takes about 90.
+    /// Stop after so many seconds; the round takes about 70.
     #[arg(long, default_value_t = Settings::DEFAULT.seconds)]
     seconds: f64,
     /// Print one JSON object.
@@ -45,14 +46,6 @@ pub struct Args {
 const MOST_BEAMS: usize = 1024;
 /// Every so many scans are drawn.
 const DRAWN: usize = 4;
-
-/// What the run gives for each scan.
-struct Track {
-    time: f64,
-    estimate: Pose,
-    truth: Pose,
-    wheels: Pose,
-}
 
 /// Drives, matches, writes, reports.
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -107,38 +100,26 @@ fn follow<const N: usize>(
         Recording::create(&args.out.join("run.mcap"), &["estimate", "truth", "wheels"])?;
     let mut trajectory = output::create(&args.out.join("trajectory.txt"))?;
     let mut truth = output::create(&args.out.join("truth.txt"))?;
-    let mut track: Vec<Track> = Vec::new();
-    let mut drawn = Vec::new();
+    let mut track = Track::new(origin.truth, settings.mount.into(), DRAWN);
     let bar = output::progress(turns.len(), "matching");
-    for (number, turn) in turns.iter().enumerate() {
+    for turn in turns {
         let Some(now) = moment(&drive, turn) else {
             break;
         };
         let step = pipeline.step(&turn.beams, Some(now.wheels.into()));
-        let at = Track {
+        let true_pose: Pose = origin.truth.between(now.truth).into();
+        let wheels: Pose = origin.wheels.between(now.wheels).into();
+        let at = At {
             time: now.time,
             estimate: step.pose,
-            truth: origin.truth.between(now.truth).into(),
-            wheels: origin.wheels.between(now.wheels).into(),
+            truth: Some(true_pose),
+            wheels: Some(wheels),
         };
-        let before = track.last();
-        let motion = before.map_or(Pose::IDENTITY, |before| {
-            before.estimate.between(at.estimate)
-        });
-        let seconds = before.map_or(0.0, |before| (at.time - before.time) as f32);
-        let points = places(&turn.beams, motion, seconds, settings.mount.into());
-        recording.push(at.time, &points, &[at.estimate, at.truth, at.wheels])?;
-        for (file, pose) in [(&mut trajectory, at.estimate), (&mut truth, at.truth)] {
-            writeln!(file, "{:.6} {} {} {}", at.time, pose.x, pose.y, pose.theta)?;
+        let points = track.push(at, &turn.beams);
+        recording.push(now.time, &points, &[step.pose, true_pose, wheels])?;
+        for (file, pose) in [(&mut trajectory, step.pose), (&mut truth, true_pose)] {
+            writeln!(file, "{:.6} {} {} {}", now.time, pose.x, pose.y, pose.theta)?;
         }
-        if number % DRAWN == 0 {
-            drawn.extend(
-                points
-                    .iter()
-                    .map(|&point| in_world(origin.truth, at.estimate * point)),
-            );
-        }
-        track.push(at);
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -146,7 +127,7 @@ fn follow<const N: usize>(
     trajectory.flush()?;
     truth.flush()?;
 
-    let errors = Errors::of(&track);
+    let errors = track.errors();
     let seconds = drive.moments.last().map_or(0.0, |moment| moment.time);
     let caption = format!(
         "{seconds:.0} s, {:.1} m driven; error at the end {:.1} cm, {:.2}°; largest {:.1} cm, {:.2}°",
@@ -156,37 +137,13 @@ fn follow<const N: usize>(
         100.0 * errors.largest.0,
         errors.largest.1
     );
-    let picture = map::Map {
-        title: format!(
-            "beamfix: {} in the simulated flat, seed {}",
-            args.lidar, args.seed
-        ),
-        caption: caption.clone(),
-        world: Some(drive.world),
-        points: drawn,
-        paths: vec![
-            path(
-                "wheel odometry alone",
-                colour::ORANGE,
-                2,
-                &track,
-                origin.truth,
-                |t| t.wheels,
-            ),
-            path("true path", colour::GREEN, 6, &track, origin.truth, |t| {
-                t.truth
-            }),
-            path(
-                "estimated path",
-                colour::RED,
-                2,
-                &track,
-                origin.truth,
-                |t| t.estimate,
-            ),
-        ],
-    };
-    picture::save(&picture, &args.out.join("map.png"))?;
+    let title = format!(
+        "beamfix: {} in the simulated flat, seed {}",
+        args.lidar, args.seed
+    );
+    let map = track.map(title.clone(), caption.clone(), Some(drive.world));
+    picture::save(&map, &args.out.join("map.png"))?;
+    picture::save(&track.chart(title), &args.out.join("errors.svg"))?;
 
     let Counters {
         scans,
@@ -205,7 +162,7 @@ fn follow<const N: usize>(
     });
     let text = format!(
         "{caption}\nwheels alone: {:.1} cm, {:.2}° at the end\n{} bytes, {} packets, {} scans, {} refused, {} keyframes\n\
-         pose hash {}\nwritten to {}: map.png trajectory.txt truth.txt run.mcap",
+         pose hash {}\nwritten to {}: map.png errors.svg trajectory.txt truth.txt run.mcap",
         100.0 * errors.wheels.0,
         errors.wheels.1,
         drive.bytes.len(),
@@ -223,52 +180,4 @@ fn follow<const N: usize>(
 /// The robot at a turn's last beam.
 fn moment(drive: &Drive, turn: &Turn) -> Option<sim::Moment> {
     drive.moments.get(turn.ends_at.checked_sub(1)?).copied()
-}
-
-fn in_world(origin: TruePose, point: Point) -> [f64; 2] {
-    let place = origin.then(TruePose::new(f64::from(point.x), f64::from(point.y), 0.0));
-    [place.x, place.y]
-}
-
-fn path(
-    name: &str,
-    colour: plotters::style::RGBColor,
-    width: u32,
-    track: &[Track],
-    origin: TruePose,
-    pose: impl Fn(&Track) -> Pose,
-) -> map::Path {
-    let places = track.iter().map(|at| {
-        let pose = pose(at);
-        in_world(origin, Point::new(pose.x, pose.y))
-    });
-    map::Path {
-        name: name.to_owned(),
-        colour,
-        width,
-        places: places.collect(),
-    }
-}
-
-/// Errors in metres and degrees.
-struct Errors {
-    last: (f64, f64),
-    largest: (f64, f64),
-    wheels: (f64, f64),
-}
-
-impl Errors {
-    fn of(track: &[Track]) -> Self {
-        let off = |truth: Pose, found: Pose| {
-            let off = TruePose::from(truth).between(found.into());
-            (off.distance(), off.theta.to_degrees().abs())
-        };
-        let largest = track.iter().map(|at| off(at.truth, at.estimate));
-        let last = track.last();
-        Self {
-            last: last.map_or((0.0, 0.0), |at| off(at.truth, at.estimate)),
-            largest: largest.fold((0.0, 0.0), |a, b| (a.0.max(b.0), a.1.max(b.1))),
-            wheels: last.map_or((0.0, 0.0), |at| off(at.truth, at.wheels)),
-        }
-    }
 }
