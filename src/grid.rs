@@ -46,6 +46,8 @@ pub enum GridError {
         /// Passed.
         passed: usize,
     },
+    /// Bytes that should hold a grid begin otherwise, or with numbers that cannot be.
+    Format,
     /// The grid is wider than the fixed-point coordinates reach.
     Extent {
         /// Longest side (m).
@@ -67,6 +69,7 @@ impl fmt::Display for GridError {
                 write!(f, "cells of {metres} m: 0.005 to 2 m are possible")
             }
             Self::Origin => f.write_str("the grid's origin is not finite"),
+            Self::Format => f.write_str("the bytes do not begin as a grid's do"),
             Self::Storage { needed, passed } => {
                 write!(f, "the cells need {needed} entries, {passed} were passed")
             }

@@ -3,6 +3,9 @@
 mod bench;
 mod card;
 mod decode;
+mod field;
+mod learn;
+mod localize;
 mod output;
 mod pairs;
 mod replay;
@@ -33,6 +36,8 @@ enum Command {
     Replay(replay::Args),
     Pairs(pairs::Args),
     Decode(decode::Args),
+    Field(field::Args),
+    Learn(learn::Args),
     Bench(bench::Args),
     Card(card::Args),
     Verify(verify::Args),
@@ -46,6 +51,8 @@ pub fn run() -> ExitCode {
     let tool = Tool::parse();
     let done: Result<ExitCode> = match tool.command {
         Some(Command::Decode(args)) => decode::run(&args),
+        Some(Command::Field(args)) => field::run(&args),
+        Some(Command::Learn(args)) => learn::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Pairs(args)) => pairs::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),

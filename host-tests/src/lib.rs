@@ -5,6 +5,7 @@ pub mod decode;
 pub mod encoder;
 pub mod golden;
 pub mod hash;
+pub mod learn;
 pub mod map_file;
 pub mod matcher;
 pub mod picture;

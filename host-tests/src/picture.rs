@@ -2,6 +2,7 @@
 
 pub mod axes;
 pub mod chart;
+pub mod density;
 pub mod map;
 pub mod pair;
 

@@ -7,6 +7,7 @@
 
 pub mod placement;
 pub mod stamp;
+pub mod stored;
 pub mod tiles;
 
 use super::ConfigError;

@@ -17,6 +17,7 @@ use host_tests::sim::TruePose;
 use host_tests::{size, sized};
 use serde_json::json;
 
+use super::localize::replay as localize_replay;
 use super::output;
 use super::track::{At, Track};
 
@@ -24,7 +25,7 @@ use super::track::{At, Track};
 #[derive(clap::Args)]
 pub struct Args {
     /// The log.
-    log: PathBuf,
+    pub(super) log: PathBuf,
     /// Take the log as raw bytes of this sensor.
     #[arg(long, value_name = "MODEL")]
     lidar: Option<String>,
@@ -39,16 +40,20 @@ pub struct Args {
     tier: Option<Tier>,
     /// Where to write a line `timestamp x y theta` for every scan.
     #[arg(long, value_name = "FILE")]
-    trajectory: Option<PathBuf>,
-    /// Draw what was seen and driven into this file, PNG or SVG by its ending.
+    pub(super) trajectory: Option<PathBuf>,
+    /// Draw what was seen and driven into this file, PNG or SVG by its ending; with --mode localize: the map to
+    /// localize in, a ROS map's YAML file.
     #[arg(long, value_name = "FILE")]
-    map: Option<PathBuf>,
+    pub(super) map: Option<PathBuf>,
     /// The lidar's place on the robot (m, m, deg), where the log does not tell or tells it wrong.
     #[arg(long, value_name = "X,Y,DEG", value_parser = mount, allow_hyphen_values = true)]
-    mount: Option<Pose>,
+    pub(super) mount: Option<Pose>,
+    /// Where the robot starts in the map (m, m, deg). Default: it finds itself.
+    #[arg(long, value_name = "X,Y,DEG", value_parser = mount, allow_hyphen_values = true)]
+    pub(super) start: Option<Pose>,
     /// Stop after so many scans.
     #[arg(long, value_name = "N")]
-    scans: Option<usize>,
+    pub(super) scans: Option<usize>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -87,6 +92,13 @@ enum Tier {
 /// About so many scans are drawn into a map.
 const DRAWN: usize = 400;
 
+impl Args {
+    /// Whether the log's wheel odometry is the prior.
+    pub(super) fn uses_wheels(&self) -> bool {
+        self.prior == Prior::Odometry
+    }
+}
+
 /// What a replay came to.
 struct Outcome {
     counters: Counters,
@@ -97,8 +109,8 @@ struct Outcome {
 
 /// Replays the log.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    if args.mode != Mode::Odometry {
-        bail!("--mode: only odometry is built so far");
+    if args.mode == Mode::Slam {
+        bail!("--mode: slam is not built so far");
     }
     let log = match &args.lidar {
         Some(lidar) => capture::read(&args.log, lidar)?,
@@ -108,6 +120,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Some(tier) => tier as usize,
         None => size::fitting(log.scans.iter().map(|scan| &scan.beams[..])),
     };
+    if args.mode == Mode::Localize {
+        return localized(args, &log, size);
+    }
     let outcome = sized!(size, replay(args, &log))?;
     let Counters {
         scans,
@@ -133,6 +148,37 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             outcome.refused_beams
         );
     }
+    output::report(args.json, &value, &text)?;
+    if let Some(remarks) = log.remarks() {
+        eprintln!("beamfix: {}: {remarks}", args.log.display());
+    }
+    match &log.cut {
+        Some(cut) => Err(anyhow!("{}: {cut}", args.log.display())),
+        None => Ok(ExitCode::SUCCESS),
+    }
+}
+
+/// Replays the log in a map.
+fn localized(args: &Args, log: &Log, size: usize) -> Result<ExitCode> {
+    let outcome = sized!(size, localize_replay(args, log))?;
+    let value = json!({
+        "scans": outcome.scans, "refused": outcome.scans - outcome.tracked, "keyframes": 0, "loops": 0,
+        "tracked": outcome.tracked, "doubtful": outcome.doubtful, "lost": outcome.lost, "searches": outcome.searches,
+        "beams": size, "refused_beams": outcome.refused_beams, "skipped": log.skipped,
+        "pose_hash": outcome.hash.to_string(),
+    });
+    let Pose { x, y, theta } = outcome.last;
+    let text = format!(
+        "{} scans, {} with a pose, {} doubtful, {} times lost, {} searches\n\
+         last pose {x:.3} m {y:.3} m {:.2}°\npose hash {}",
+        outcome.scans,
+        outcome.tracked,
+        outcome.doubtful,
+        outcome.lost,
+        outcome.searches,
+        theta.to_degrees(),
+        outcome.hash
+    );
     output::report(args.json, &value, &text)?;
     if let Some(remarks) = log.remarks() {
         eprintln!("beamfix: {}: {remarks}", args.log.display());

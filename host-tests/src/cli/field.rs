@@ -1,0 +1,135 @@
+//! `field`: a ROS map becomes a likelihood field for flash.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use beamfix::grid::occupancy::{self, Cell};
+use beamfix::matching::correlative::pyramid::Pyramid;
+use beamfix::sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile, stored};
+use host_tests::map_file;
+use serde_json::json;
+
+use super::output;
+
+/// Likelihood field of a ROS map (YAML and PGM) for flash: a binary table, a Rust const, a heat map.
+///
+/// Writes FILE, FILE with .rs and FILE with .png. The table's layout: beamfix::sensor_model::likelihood_field::stored.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The map's YAML file.
+    map: PathBuf,
+    /// Where to write the table.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Spread of hits (m).
+    #[arg(long, default_value_t = 0.075)]
+    sigma: f32,
+    /// Weight of random returns; hits have the rest.
+    #[arg(long, default_value_t = 0.1)]
+    z_rand: f32,
+    /// Longest range (m).
+    #[arg(long, default_value_t = 12.0)]
+    z_max: f32,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Reads, says how large it becomes, writes.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let map = map_file::read(&args.map)?;
+    let shape = *map.shape();
+    let bytes = stored::HEADER + shape.len();
+    let ram = Pyramid::bytes(&shape);
+    eprintln!(
+        "{} x {} cells of {} m: {bytes} bytes of flash, and {ram} bytes of RAM where it is searched",
+        shape.width(),
+        shape.height(),
+        shape.resolution()
+    );
+    let model = FieldModel::new(1.0 - args.z_rand, args.z_rand, args.z_max, args.sigma)
+        .context("--sigma, --z-rand, --z-max")?;
+    let squares = map_file::squares(&map, occupancy::is_occupied);
+    let profile = Profile::new(&model);
+    let field =
+        LikelihoodField::from_map(&map.as_slice(), &squares, &profile, vec![0; shape.len()])?;
+    let header = stored::header(&field.as_slice());
+    let mut file = output::create(&args.out)?;
+    file.write_all(&header)?;
+    file.write_all(field.grid().cells())?;
+    file.flush()
+        .with_context(|| args.out.display().to_string())?;
+    let code = args.out.with_extension("rs");
+    write_const(&header, field.grid().cells(), &code)?;
+    let picture = args.out.with_extension("png");
+    heat_map(&field, &picture)?;
+    let count = |cell: Cell| {
+        map.cells()
+            .iter()
+            .filter(|&&byte| occupancy::cell(byte) == cell)
+            .count()
+    };
+    let (occupied, unknown) = (count(Cell::Occupied), count(Cell::Unknown));
+    let value = json!({
+        "width": shape.width(), "height": shape.height(), "resolution": shape.resolution(), "flash_bytes": bytes,
+        "ram_bytes": ram, "occupied": occupied, "free": count(Cell::Free), "unknown": unknown,
+        "files": [args.out, code, picture],
+    });
+    let text = format!(
+        "{occupied} cells occupied, {unknown} unknown\nwrote {}, {} and {}",
+        args.out.display(),
+        code.display(),
+        picture.display()
+    );
+    output::report(args.json, &value, &text)?;
+    if occupied == 0 {
+        eprintln!(
+            "beamfix: {}: no cell is occupied: nothing can be matched with it",
+            args.map.display()
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The same bytes as a constant for a firmware's source.
+fn write_const(header: &[u8], cells: &[u8], path: &std::path::Path) -> Result<()> {
+    let mut text = format!(
+        "/// A likelihood field: `beamfix::sensor_model::likelihood_field::stored::parse(&FIELD)`.\n\
+         pub const FIELD: [u8; {}] = [\n",
+        header.len() + cells.len()
+    );
+    let all: Vec<u8> = header.iter().chain(cells).copied().collect();
+    for row in all.chunks(32) {
+        for byte in row {
+            write!(text, "{byte},")?;
+        }
+        text.push('\n');
+    }
+    text.push_str("];\n");
+    std::fs::write(path, text).with_context(|| path.display().to_string())
+}
+
+/// Cells from black over red to white as a beam likes to end there; blue-grey where nothing is explored.
+fn heat_map(field: &LikelihoodField<Vec<u8>>, path: &std::path::Path) -> Result<()> {
+    let shape = field.grid().shape();
+    let unexplored = stored::header(&field.as_slice())[5];
+    let (width, height) = (u32::from(shape.width()), u32::from(shape.height()));
+    let picture = image::RgbImage::from_fn(width, height, |x, y| {
+        let byte = field
+            .grid()
+            .get(x as i32, (height - 1 - y) as i32)
+            .unwrap_or(unexplored);
+        image::Rgb(if byte == unexplored {
+            [90, 100, 120]
+        } else {
+            let part = |from: i32| ((i32::from(byte) - from) * 3).clamp(0, 255) as u8;
+            [part(0), part(85), part(170)]
+        })
+    });
+    picture
+        .save(path)
+        .with_context(|| path.display().to_string())
+}

@@ -1,0 +1,167 @@
+//! `field`, `learn` and `replay --mode localize` as they are called.
+
+mod common;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+use beamfix::sensor_model::likelihood_field::stored;
+use common::shared;
+use host_tests::{map_file, sim::home};
+
+fn beamfix(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_beamfix"))
+        .args(arguments)
+        .output()
+        .expect("the tool starts")
+}
+
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::create_dir_all(&folder).expect("a folder");
+    folder
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a path in UTF-8")
+}
+
+#[test]
+fn a_map_becomes_a_table_for_flash() {
+    let folder = folder("field-cli");
+    let (low, high) = home::EXTENT;
+    let map = map_file::of_world(&home::home(), low, high, 0.05, home::INSIDE).expect("a map");
+    let yaml = folder.join("home.yaml");
+    map_file::write(&map, &yaml).expect("written");
+    let table = folder.join("home.field");
+    let output = beamfix(&["field", text(&yaml), "--out", text(&table), "--json"]);
+    assert!(output.status.success(), "{output:?}");
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    let bytes = fs::read(&table).expect("written");
+    assert_eq!(json["flash_bytes"], bytes.len());
+    // A home of 20 m by 16 m in cells of 5 cm: 128 KB.
+    assert!(bytes.len() <= 128 * 1024, "{} bytes", bytes.len());
+    let field = stored::parse(&bytes).expect("a field");
+    assert_eq!(
+        (field.grid().shape().width(), field.grid().shape().height()),
+        (400, 320)
+    );
+    let source = fs::read_to_string(folder.join("home.rs")).expect("written");
+    assert!(source.contains(&format!("pub const FIELD: [u8; {}]", bytes.len())));
+    let numbers = source
+        .lines()
+        .skip(2)
+        .flat_map(|line| line.split(','))
+        .filter_map(|n| n.parse::<u8>().ok());
+    assert!(
+        numbers.eq(bytes.iter().copied()),
+        "the const is not the table"
+    );
+    let picture = image::open(folder.join("home.png")).expect("a picture");
+    assert_eq!((picture.width(), picture.height()), (400, 320));
+}
+
+#[test]
+fn a_bad_map_ends_with_one_line_and_status_2() {
+    let folder = folder("field-cli-bad");
+    let yaml = folder.join("bad.yaml");
+    fs::write(
+        &yaml,
+        "image: bad.pgm\nresolution: 0.05\norigin: [0, .nan, 0]\n",
+    )
+    .expect("written");
+    for arguments in [
+        vec!["field", text(&yaml), "--out", "/dev/null"],
+        vec!["field", "missing.yaml", "--out", "/dev/null"],
+        vec!["learn", "missing.log"],
+    ] {
+        let output = beamfix(&arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(stderr.lines().count(), 1, "{stderr}");
+    }
+}
+
+#[test]
+fn intel_is_learned_from_and_localized_in() {
+    let (Some(corrected), Some(raw)) = (
+        shared("datasets/logs/intel-corrected.log.gz"),
+        shared("datasets/logs/intel.log.gz"),
+    ) else {
+        return;
+    };
+    let folder = folder("field-cli-intel");
+    let (map, picture) = (folder.join("intel.yaml"), folder.join("model.png"));
+    let output = beamfix(&[
+        "learn",
+        text(&corrected),
+        "--keep-map",
+        text(&map),
+        "--picture",
+        text(&picture),
+        "--json",
+    ]);
+    assert!(output.status.success(), "{output:?}");
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    println!("{json}");
+    let steps: Vec<f64> = json["log_likelihood"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(serde_json::Value::as_f64)
+        .collect();
+    assert!(
+        steps.len() >= 2 && steps.windows(2).all(|pair| pair[1] >= pair[0]),
+        "{steps:?}"
+    );
+    // Cells of 5 cm, a SICK of 1 to 2 cm: between them, and more the flatter the beam.
+    let sigma = |value: &serde_json::Value| value["model"]["sigma"].as_f64().expect("a number");
+    assert!(
+        (0.01..0.08).contains(&json["model"]["sigma"].as_f64().expect("a number")),
+        "{json}"
+    );
+    let bins: Vec<f64> = json["by_incidence"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(sigma)
+        .collect();
+    assert!(bins.windows(2).all(|pair| pair[1] > pair[0]), "{bins:?}");
+    assert!(json["model"]["z_hit"].as_f64().expect("a number") > 0.8);
+    assert!(picture.exists());
+
+    let trajectory = folder.join("localized.txt");
+    let arguments = [
+        "replay",
+        text(&raw),
+        "--mode",
+        "localize",
+        "--map",
+        text(&map),
+        "--trajectory",
+        text(&trajectory),
+        "--json",
+    ];
+    let output = beamfix(&arguments);
+    assert!(output.status.success(), "{output:?}");
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    println!("{json}");
+    // It starts without a pose, and never loses it once it is found.
+    assert_eq!(
+        (&json["lost"], &json["searches"]),
+        (&0.into(), &1.into()),
+        "{json}"
+    );
+    assert!(
+        json["tracked"].as_u64().expect("a number") >= 13_000,
+        "{json}"
+    );
+    let lines = fs::read_to_string(&trajectory)
+        .expect("written")
+        .lines()
+        .count();
+    assert_eq!(json["scans"], lines);
+}
