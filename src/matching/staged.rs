@@ -1,0 +1,293 @@
+//! Iterative closest point with every stage a choice: for comparing, teaching, and scenes that want another mixture.
+//!
+//! The stages are those of Rusinkiewicz and Levoy (3DIM 2001). Each is a small trait with a type a choice; what is not
+//! chosen costs no flash. [`icp`](super::icp) is one fixed mixture in integers, several times faster: take it unless
+//! it lacks something.
+//!
+//! | stage | default | choices |
+//! | --- | --- | --- |
+//! | [`selection`] | [`All`](selection::All) | every k-th, random, features, normal space |
+//! | [`correspondence`] | [`Closest`](correspondence::Closest) | brute force, compatible, normal shooting, projection |
+//! | [`weighting`] | [`Constant`](weighting::Constant) | distance, normals, range noise, four robust kernels, pairs of these |
+//! | [`rejection`] | [`Trimmed`](rejection::Trimmed) | distance, worst share, median, doubles, boundary, visibility, pairs |
+//! | [`minimisation`] | [`PointToLine`](minimisation::PointToLine) | point to point, Censi's constrained form |
+
+pub mod correspondence;
+pub mod minimisation;
+pub mod normals;
+pub mod rejection;
+pub mod selection;
+mod verdict;
+pub mod weighting;
+
+use crate::{
+    geometry::{Point, Pose},
+    matching::{Match, MatchError},
+    math,
+    scan::ScanPoint,
+};
+use correspondence::Correspond;
+use heapless::Vec;
+use minimisation::Minimise;
+use normals::Surface;
+use rejection::Reject;
+use selection::Select;
+use weighting::Weigh;
+
+/// A choice for every stage, and when to stop.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Stages<S, C, W, R, M> {
+    /// Which points take part.
+    pub selection: S,
+    /// Which reference point each is paired with.
+    pub correspondence: C,
+    /// What a pair counts.
+    pub weighting: W,
+    /// Which pairs do not count at all.
+    pub rejection: R,
+    /// What is made small, and how.
+    pub minimisation: M,
+    /// When it ends.
+    pub limits: Limits,
+}
+
+/// When the loop ends, and what it needs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Most passes. Default 30.
+    pub iterations: u8,
+    /// A step shorter than this (m) ... Default 1e-4: a hundredth of the noise of a range.
+    pub translation: f32,
+    /// ... and turning by less than this (rad) ends the loop. Default 1e-4.
+    pub rotation: f32,
+    /// Fewest pairs that must count. Default 30.
+    pub pairs: u16,
+    /// Neighbours on each side that a surface's line is laid through. Default 4: 9 points at 1° see 0.3 m of a wall 2 m
+    /// away.
+    pub neighbours: u8,
+    /// Standard deviation of a range (m): the least noise that the covariance assumes. Default 0.01.
+    pub range_sigma: f32,
+}
+
+impl Limits {
+    /// For scans of a few hundred beams.
+    pub const DEFAULT: Self = Self {
+        iterations: 30,
+        translation: 1e-4,
+        rotation: 1e-4,
+        pairs: 30,
+        neighbours: 4,
+        range_sigma: 0.01,
+    };
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// A scan and the surfaces that its points lie on, both in the order of measurement and of the same length.
+#[derive(Debug, Clone, Copy)]
+pub struct Cloud<'a> {
+    /// Places hit (mm).
+    pub points: &'a [ScanPoint],
+    /// The line through each and its neighbours.
+    pub surfaces: &'a [Surface],
+}
+
+/// A point and its correspondence, both in the reference's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pair {
+    /// Where the point comes to lie (m).
+    pub place: Point,
+    /// Its surface's normal; (0, 0) where it has none.
+    pub normal: [f32; 2],
+    /// Index of the point in its scan.
+    pub point: u16,
+    /// Index of the reference point.
+    pub reference: u16,
+    /// Distance from the reference point (m).
+    pub distance: f32,
+    /// Signed distance from the reference point's line (m), towards the reference's lidar; `distance` where it has
+    /// no line.
+    pub across: f32,
+    /// What is minimised: one of the two above.
+    pub residual: f32,
+    /// What the pair counts; 0 once it is rejected.
+    pub weight: f32,
+}
+
+/// Room for [`align`]: about 77·N bytes. N is the most points a scan may have; further ones are left out.
+#[derive(Debug, Clone)]
+pub struct Workspace<const N: usize> {
+    reference: [Surface; N],
+    current: [Surface; N],
+    chosen: [bool; N],
+    pairs: Vec<Pair, N>,
+}
+
+impl<const N: usize> Workspace<N> {
+    /// Room with nothing in it.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            reference: [Surface::NONE; N],
+            current: [Surface::NONE; N],
+            chosen: [false; N],
+            pairs: Vec::new(),
+        }
+    }
+
+    /// The pairs of the last pass, those rejected with weight 0.
+    #[must_use]
+    pub fn pairs(&self) -> &[Pair] {
+        &self.pairs
+    }
+}
+
+impl<const N: usize> Default for Workspace<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Pose of the lidar that saw `points` in the frame of the one that saw `reference`.
+///
+/// `guess` is where the search starts and what the result keeps along a direction that the scene does not determine.
+/// Some thousand instructions a point and pass without an FPU: for hosts and the larger boards.
+///
+/// A pair that changes sides at every pass moves the pose by less than the noise: a last step below 1 cm and 0.3° is a
+/// result, too.
+///
+/// # Errors
+/// See [`MatchError`]: too few beams, pairs or directions, or the last step was longer than that.
+pub fn align<const N: usize, S, C, W, R, M>(
+    reference: &[ScanPoint],
+    points: &[ScanPoint],
+    guess: Pose,
+    stages: &mut Stages<S, C, W, R, M>,
+    workspace: &mut Workspace<N>,
+) -> Result<Match, MatchError>
+where
+    S: Select,
+    C: Correspond,
+    W: Weigh,
+    R: Reject,
+    M: Minimise,
+{
+    let limits = stages.limits;
+    let (reference, points) = (first(reference, N), first(points, N));
+    verdict::enough(reference, points, guess, &limits)?;
+    let half = usize::from(limits.neighbours);
+    let Workspace {
+        reference: lines,
+        current,
+        chosen,
+        pairs,
+    } = workspace;
+    let reference = normals::lay(reference, half, lines);
+    let current = normals::lay(points, half, current);
+    let chosen = first_mut(chosen, current.points.len());
+    chosen.fill(false);
+    stages.selection.select(current, chosen);
+    stages.correspondence.prepare(reference);
+    let (mut pose, mut last, mut passes) = (guess, Pose::IDENTITY, 0);
+    while passes < limits.iterations {
+        passes += 1;
+        associate(stages, reference, current, chosen, pose, pairs);
+        for pair in pairs.iter_mut() {
+            pair.weight = stages.weighting.weigh(pair, reference);
+        }
+        stages.rejection.reject(pairs, reference);
+        verdict::enough_pairs(pairs, &limits)?;
+        let step = stages.minimisation.step(pairs, reference, pose);
+        last = step.ok_or(MatchError::Degenerate)?;
+        pose = Pose::new(pose.x + last.x, pose.y + last.y, pose.theta + last.theta);
+        if last.distance() < limits.translation && math::abs(last.theta) < limits.rotation {
+            break;
+        }
+    }
+    verdict::judge(
+        pairs,
+        reference,
+        current,
+        [guess, pose, last],
+        passes,
+        &limits,
+    )
+}
+
+/// Pairs every chosen point, at `pose`, with its correspondence.
+fn associate<const N: usize, S, C, W, R, M>(
+    stages: &mut Stages<S, C, W, R, M>,
+    reference: Cloud<'_>,
+    current: Cloud<'_>,
+    chosen: &[bool],
+    pose: Pose,
+    pairs: &mut Vec<Pair, N>,
+) where
+    C: Correspond,
+    M: Minimise,
+{
+    pairs.clear();
+    let (s, c) = math::sin_cos(pose.theta);
+    let turned = |x: f32, y: f32| [c * x - s * y, s * x + c * y];
+    let all = current.points.iter().zip(current.surfaces);
+    for (index, ((point, surface), _)) in all.zip(chosen).enumerate().filter(|(_, (_, on))| **on) {
+        let [x, y] = turned(f32::from(point.x) * 1e-3, f32::from(point.y) * 1e-3);
+        let place = Point::new(x + pose.x, y + pose.y);
+        let [nx, ny] = surface.normal;
+        let normal = turned(nx, ny);
+        let Some(found) = stages.correspondence.find(reference, place, normal) else {
+            continue;
+        };
+        let Some(mut pair) = Pair::new(reference, place, normal, index, found) else {
+            continue;
+        };
+        pair.residual = stages.minimisation.residual(&pair);
+        // As many pairs as points at most: it fits.
+        let _ = pairs.push(pair);
+    }
+}
+
+impl Pair {
+    /// The point at `place` and the `found`-th reference point.
+    fn new(
+        reference: Cloud<'_>,
+        place: Point,
+        normal: [f32; 2],
+        index: usize,
+        found: usize,
+    ) -> Option<Self> {
+        let (point, surface) = (reference.points.get(found)?, reference.surfaces.get(found)?);
+        let off = Point::new(
+            place.x - f32::from(point.x) * 1e-3,
+            place.y - f32::from(point.y) * 1e-3,
+        );
+        let distance = off.norm();
+        Some(Self {
+            place,
+            normal,
+            point: index as u16,
+            reference: found as u16,
+            distance,
+            across: if surface.is_some() {
+                surface.across(place)
+            } else {
+                distance
+            },
+            residual: distance,
+            weight: 1.0,
+        })
+    }
+}
+
+fn first<T>(slice: &[T], most: usize) -> &[T] {
+    slice.get(..most).unwrap_or(slice)
+}
+
+fn first_mut<T>(slice: &mut [T], most: usize) -> &mut [T] {
+    let most = most.min(slice.len());
+    slice.split_at_mut(most).0
+}

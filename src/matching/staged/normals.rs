@@ -1,0 +1,239 @@
+//! The surface under each point of an ordered scan: total least squares over its neighbours.
+
+use crate::{geometry::Point, matching::staged::Cloud, math, scan::ScanPoint};
+
+/// A line through a point and its neighbours. 20 bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// The point's foot on the line (m): it carries less noise than the point itself.
+    pub foot: Point,
+    /// Unit normal, towards the lidar; (0, 0) where there is no line.
+    pub normal: [f32; 2],
+    /// First or last point of its run: what lies beyond may be the same surface, or nothing.
+    pub edge: bool,
+}
+
+/// Root mean square distance of the points from their line beyond which it is none (m): twice the noise of a cheap
+/// lidar.
+const FLAT: f32 = 0.02;
+/// Two neighbours belong to one surface if they are nearer than this (m) and ...
+const GAP: f32 = 0.1;
+/// ... this many times their distance across the beams: walls down to 7° of grazing.
+const GAP_SLOPE: f32 = 8.0;
+/// Widest angle between the two (1/65536 turn): 5.5°.
+const WIDEST: u16 = 1000;
+
+impl Surface {
+    /// No line.
+    pub const NONE: Self = Self {
+        foot: Point::new(0.0, 0.0),
+        normal: [0.0; 2],
+        edge: true,
+    };
+
+    /// Whether a line could be laid.
+    #[must_use]
+    pub fn is_some(&self) -> bool {
+        self.normal != [0.0; 2]
+    }
+
+    /// Signed distance of `place` from the line (m), positive on the lidar's side.
+    #[must_use]
+    pub fn across(&self, place: Point) -> f32 {
+        let [nx, ny] = self.normal;
+        nx * (place.x - self.foot.x) + ny * (place.y - self.foot.y)
+    }
+}
+
+/// Lays a line through each of `points` and up to `half` neighbours on each side, on the same run.
+///
+/// Where those bend (a corner) the line goes through the neighbours on one side alone; where these bend too, or a run
+/// has fewer than three points, there is none. As many surfaces as fit are filled; about 30·`half` operations a point.
+pub fn lay<'a>(points: &'a [ScanPoint], half: usize, surfaces: &'a mut [Surface]) -> Cloud<'a> {
+    let mut rest = points;
+    let mut room = surfaces.iter_mut();
+    while !rest.is_empty() {
+        let (run, others) = rest.split_at(run_length(rest).clamp(1, rest.len()));
+        for (i, surface) in (0..run.len()).zip(room.by_ref()) {
+            *surface = at(run, i, half);
+        }
+        rest = others;
+    }
+    let filled = points.len().min(surfaces.len());
+    Cloud {
+        points: points.split_at(filled).0,
+        surfaces: surfaces.split_at(filled).0,
+    }
+}
+
+/// Number of points from the first on that lie on one surface.
+fn run_length(points: &[ScanPoint]) -> usize {
+    let breaks = points.windows(2).position(|pair| {
+        let [a, b] = pair else { return true };
+        !same_surface(a, b)
+    });
+    breaks.map_or(points.len(), |at| at + 1)
+}
+
+/// Whether two points measured one after the other are near enough to lie on one surface.
+pub(in crate::matching) fn same_surface(a: &ScanPoint, b: &ScanPoint) -> bool {
+    let (dx, dy) = (
+        f32::from(b.x) - f32::from(a.x),
+        f32::from(b.y) - f32::from(a.y),
+    );
+    let turn = (b.bearing.0.wrapping_sub(a.bearing.0) as i16).unsigned_abs();
+    let nearer = f32::from(a.range.min(b.range));
+    let across = nearer * f32::from(turn) * (core::f32::consts::TAU / 65536.0);
+    let most = 1e3 * GAP + GAP_SLOPE * across;
+    turn < WIDEST && dx * dx + dy * dy < most * most
+}
+
+/// The surface under the `i`-th point of a run.
+fn at(run: &[ScanPoint], i: usize, half: usize) -> Surface {
+    let Some(point) = run.get(i) else {
+        return Surface::NONE;
+    };
+    let edge = i == 0 || i + 1 == run.len();
+    let place = Point::new(f32::from(point.x) * 1e-3, f32::from(point.y) * 1e-3);
+    let last = run.len() - 1;
+    let span = |from: usize, to: usize| run.get(from..=to.min(last));
+    let (centred, before, after) = (
+        span(i.saturating_sub(half), i + half),
+        span(i.saturating_sub(half), i),
+        span(i, i + half),
+    );
+    let flat = |points: Option<&[ScanPoint]>| Some(fit(points?, place)?).filter(|f| f.rms < FLAT);
+    let one_side = || match (flat(before), flat(after)) {
+        (Some(a), Some(b)) => Some(if a.rms < b.rms { a } else { b }),
+        (a, b) => a.or(b),
+    };
+    flat(centred).or_else(one_side).map_or(
+        Surface {
+            foot: place,
+            normal: [0.0; 2],
+            edge,
+        },
+        |fit| {
+            let [nx, ny] = fit.normal;
+            Surface {
+                foot: Point::new(place.x + nx * fit.offset, place.y + ny * fit.offset),
+                normal: fit.normal,
+                edge,
+            }
+        },
+    )
+}
+
+struct Fit {
+    /// Unit normal towards the lidar.
+    normal: [f32; 2],
+    /// Distance of the line from the point (m), along the normal.
+    offset: f32,
+    /// Root mean square distance of the points from the line (m).
+    rms: f32,
+}
+
+/// Total least squares: the line's direction is half that of `(S_xx − S_yy, 2 S_xy)`. `None` for fewer than three points.
+fn fit(points: &[ScanPoint], place: Point) -> Option<Fit> {
+    if points.len() < 3 {
+        return None;
+    }
+    // Relative to the point, so that nothing large cancels.
+    let relative = |p: &ScanPoint| {
+        [
+            f32::from(p.x) * 1e-3 - place.x,
+            f32::from(p.y) * 1e-3 - place.y,
+        ]
+    };
+    let n = points.len() as f32;
+    let (sx, sy) = points.iter().fold((0.0, 0.0), |(x, y), p| {
+        let [dx, dy] = relative(p);
+        (x + dx, y + dy)
+    });
+    let (mx, my) = (sx / n, sy / n);
+    let (xx, xy, yy) = points.iter().fold((0.0, 0.0, 0.0), |(xx, xy, yy), p| {
+        let [dx, dy] = relative(p);
+        let (dx, dy) = (dx - mx, dy - my);
+        (xx + dx * dx, xy + dx * dy, yy + dy * dy)
+    });
+    let (a, b) = (xx - yy, 2.0 * xy);
+    let r = math::sqrt(a * a + b * b);
+    if !(r > 1e-8) {
+        return None;
+    }
+    // Half the angle of (a, b), from the half-angle formulas on the side that does not cancel.
+    let (c, s) = if a > 0.0 {
+        let c = math::sqrt(0.5 * (1.0 + a / r));
+        (c, 0.5 * b / (r * c))
+    } else {
+        let s = math::sqrt(0.5 * (1.0 - a / r));
+        (0.5 * b / (r * s), s)
+    };
+    let sign = if -s * place.x + c * place.y > 0.0 {
+        -1.0
+    } else {
+        1.0
+    };
+    let normal = [-s * sign, c * sign];
+    Some(Fit {
+        normal,
+        offset: normal[0] * mx + normal[1] * my,
+        rms: math::sqrt(math::max(0.5 * (xx + yy - r), 0.0) / n),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::Bearing;
+
+    /// A wall through (2 m, 0) whose normal has direction `normal` (degrees).
+    fn wall(normal: f32) -> [ScanPoint; 21] {
+        let (s, c) = math::sin_cos(normal.to_radians());
+        core::array::from_fn(|k| {
+            let bearing = Bearing((k as u16).wrapping_mul(182).wrapping_sub(1820));
+            let (bs, bc) = math::sin_cos(bearing.radians());
+            let range = 2.0 * c / (bc * c + bs * s);
+            ScanPoint::at(bearing, math::round_to_i32(1000.0 * range) as u16)
+        })
+    }
+
+    #[test]
+    fn the_normal_of_a_wall_faces_the_lidar() {
+        for degrees in [0.0f32, 20.0, -45.0, 60.0] {
+            let points = wall(degrees);
+            let mut surfaces = [Surface::NONE; 21];
+            let cloud = lay(&points, 4, &mut surfaces);
+            let (s, c) = math::sin_cos(degrees.to_radians());
+            for (k, surface) in cloud.surfaces.iter().enumerate() {
+                // 1 mm steps over 0.1 m and more: a hundredth.
+                let [nx, ny] = surface.normal;
+                let off = (nx + c).abs() + (ny + s).abs();
+                assert!(off < 0.03, "{degrees} {k}: {surface:?}");
+                assert_eq!(surface.edge, k == 0 || k == 20, "{k}");
+                let across = surface.across(Point::new(0.0, 0.0));
+                assert!((across - 2.0 * c).abs() < 0.03, "{degrees} {k}: {across}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_corner_keeps_both_walls() {
+        // Two walls that meet at (2, 2): x = 2 below 45 degrees, y = 2 above.
+        let points: [ScanPoint; 31] = core::array::from_fn(|k| {
+            let bearing = Bearing::from_radians((30.0 + k as f32).to_radians());
+            let (s, c) = math::sin_cos(bearing.radians());
+            ScanPoint::at(bearing, (2000.0 / if s > c { s } else { c }) as u16)
+        });
+        let mut surfaces = [Surface::NONE; 31];
+        let cloud = lay(&points, 4, &mut surfaces);
+        for (k, surface) in cloud.surfaces.iter().enumerate() {
+            let [nx, ny] = surface.normal;
+            let off = if k < 15 { ny } else { nx };
+            assert!(
+                k == 15 || (surface.is_some() && off.abs() < 0.1),
+                "{k}: {surface:?}"
+            );
+        }
+    }
+}
