@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod card;
+pub mod drivers;
 pub mod emulator;
 pub mod recording;
 pub mod stream;

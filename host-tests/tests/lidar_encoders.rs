@@ -110,6 +110,12 @@ fn check_model(model: &Model, seed: u64) {
         "{name}: {} beams",
         beams.len()
     );
+    let seconds = fired[fired.len() - 1].time_us * 1e-6;
+    let bits_per_s = 10.0 * line.len() as f64 / seconds;
+    assert!(
+        bits_per_s <= f64::from(model.baud),
+        "{name}: {bits_per_s} bits/s"
+    );
     if let Some(rpm) = speed {
         let sent = 6.0 * f32::from(model.turns_per_10s);
         assert!((rpm - sent).abs() < 1.6, "{name}: {rpm} rpm, not {sent}");
@@ -212,7 +218,7 @@ fn turns_fit_the_scan_that_the_model_asks_for() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(16))]
+    #![proptest_config(ProptestConfig { cases: 32, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn any_room_comes_back(seed in any::<u64>(), k in 0..Model::ALL.len()) {
         check_model(&Model::ALL[k], seed);

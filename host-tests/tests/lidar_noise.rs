@@ -81,6 +81,7 @@ fn random_bytes_give_no_frames() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn ld06_frames_come_back(
         speed in any::<u16>(), start in 0..36_000u16, span in 0..=3000u16, stamp in 0..30_000u16,

@@ -118,7 +118,9 @@ impl super::Format for Format {
         let end_cdeg = u16::from_le_bytes([b0, b1]);
         let stamp_ms = u16::from_le_bytes([t0, t1]);
         let start = from_cdeg(start_cdeg.into());
-        let step = from_cdeg(span_cdeg(start_cdeg, end_cdeg)) / 11;
+        // 2³² / 36 000 / 11 = 10 845.877: spares a Cortex-M0 a division.
+        let span = span_cdeg(start_cdeg, end_cdeg);
+        let step = span * 10_845 + ((span * 225) >> 8);
         let first_us = self.stamps.first_us(stamp_ms);
         let packet = Packet {
             speed_deg_per_s: u16::from_le_bytes([v0, v1]),

@@ -220,10 +220,13 @@ impl Model {
         farthest_mm: 40_000,
         ..Self::RPLIDAR_DENSE
     };
-    /// RPLIDAR in HQ scan.
+    /// RPLIDAR in HQ scan; 8 bytes a point, so only on a fast line.
     pub const RPLIDAR_HQ: Self = Self {
         name: "rplidar-hq",
         family: Family::RplidarHq,
+        baud: 1_000_000,
+        points_per_s: 10_000,
+        beams_per_turn: 1100,
         ..Self::RPLIDAR_ULTRA
     };
     /// YDLIDAR X2, X2L, X3.
@@ -398,11 +401,11 @@ impl Model {
         farthest_mm: 8000,
         motor: Motor::Commands,
     };
-    /// Hokuyo URG-04LX.
+    /// Hokuyo URG-04LX: 19 200 baud after power-on; a slower line than this does not carry every scan.
     pub const URG04LX: Self = Self {
         name: "scip",
         family: Family::Scip(scip::Steps::URG04LX),
-        baud: 115_200,
+        baud: 750_000,
         points_per_s: 10_240,
         turns_per_10s: 100,
         beams_per_turn: 726,
@@ -412,11 +415,11 @@ impl Model {
         farthest_mm: 5600,
         motor: Motor::Own,
     };
-    /// SICK LMS200, LMS291.
+    /// SICK LMS200, LMS291: 9600 baud after power-on; only 500 000 carries every scan.
     pub const LMS200: Self = Self {
         name: "lms200",
         family: Family::Sick,
-        baud: 38_400,
+        baud: 500_000,
         points_per_s: 27_000,
         turns_per_10s: 750,
         beams_per_turn: 401,

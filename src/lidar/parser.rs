@@ -52,28 +52,28 @@ impl<F: Format, const L: usize> Protocol for Parser<F, L> {
     fn push(&mut self, byte: u8) -> Option<F::Packet> {
         let Self { framer, format, .. } = self;
         let frame = framer.push(byte, |bytes| format.judge(bytes))?;
-        let packet = self.format.packet(
-            frame.bytes,
-            frame.skipped_bytes == self.skipped,
-            &mut self.pace,
-        );
+        let follows = frame.skipped_bytes == self.skipped;
         self.skipped = frame.skipped_bytes;
-        self.count_turn(packet)
+        let packet = self.format.packet(frame.bytes, follows, &mut self.pace)?;
+        self.turns = self
+            .turns
+            .wrapping_add(u32::from(packet.view().turn_start.is_some()));
+        Some(packet)
     }
 
     fn pull(&mut self) -> Option<F::Packet> {
         loop {
             let Self { framer, format, .. } = self;
             let frame = framer.pull(|bytes| format.judge(bytes))?;
-            let packet = self.format.packet(
-                frame.bytes,
-                frame.skipped_bytes == self.skipped,
-                &mut self.pace,
-            );
+            let follows = frame.skipped_bytes == self.skipped;
             self.skipped = frame.skipped_bytes;
-            if packet.is_some() {
-                return self.count_turn(packet);
-            }
+            let Some(packet) = self.format.packet(frame.bytes, follows, &mut self.pace) else {
+                continue;
+            };
+            self.turns = self
+                .turns
+                .wrapping_add(u32::from(packet.view().turn_start.is_some()));
+            return Some(packet);
         }
     }
 
@@ -90,14 +90,5 @@ impl<F: Format, const L: usize> Protocol for Parser<F, L> {
             turns: self.turns,
             ..self.framer.counters()
         }
-    }
-}
-
-impl<F: Format, const L: usize> Parser<F, L> {
-    fn count_turn(&mut self, packet: Option<F::Packet>) -> Option<F::Packet> {
-        let packet = packet?;
-        let begins = packet.view().turn_start.is_some();
-        self.turns = self.turns.wrapping_add(u32::from(begins));
-        Some(packet)
     }
 }

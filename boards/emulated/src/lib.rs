@@ -5,6 +5,7 @@
 #![no_std]
 
 pub mod bench;
+pub mod drivers;
 mod panic;
 pub mod replay;
 pub mod stack;
