@@ -2,10 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use beamfix_app::telemetry::Telemetry;
 use host_tests::{
     board::{BOARDS, Replay, difference, emulator::Count, recording::Recording, stream},
     encoder::{Echo, Encoder as _, ld06::Sensor},
     readers,
+    sim::drive::{Settings, drive},
 };
 
 /// Bytes of an LD06 that stands in a square room, 8 m wide, with a door open, and turns by a degree a second.
@@ -82,5 +84,55 @@ fn every_board_replays_a_real_log_to_the_same_bits() {
             "{}",
             board.name
         );
+    }
+}
+
+/// A hundredth each of the bytes is lost, doubled or has a bit flipped.
+fn damaged(bytes: &[u8]) -> Vec<u8> {
+    let mut random = 1u64;
+    let mut damaged = Vec::new();
+    for &byte in bytes {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        match (random >> 33) % 300 {
+            0 => {}
+            1 => damaged.extend([byte, byte]),
+            2 => damaged.push(byte ^ 1 << (random >> 60 & 7)),
+            _ => damaged.push(byte),
+        }
+    }
+    damaged
+}
+
+#[test]
+fn a_damaged_line_costs_packets_not_the_run() {
+    let settings = Settings {
+        seconds: 20.0,
+        ..Settings::DEFAULT
+    };
+    let drive = drive(&settings, &mut Sensor::ld06());
+    let bytes = damaged(&drive.bytes);
+    let mut recording = Recording::new();
+    recording.lidar(&bytes);
+    recording.ask_health();
+    let here = Replay::on_host(&recording);
+    let poses: Vec<_> = here.poses().collect();
+    // A frame of 47 bytes survives with a chance of 0.99^47 = 0.62; a turn whose start is lost joins the next.
+    assert!(poses.len() > 80, "{} poses of 200", poses.len());
+    for (k, pose) in poses.iter().enumerate() {
+        assert_eq!(usize::from(pose.sequence), k);
+        assert!(pose.pose.iter().all(|value| value.is_finite()), "{pose:?}");
+    }
+    let Some(Telemetry::Health(health)) = here.messages.last() else {
+        panic!("{:?}", here.messages.last());
+    };
+    println!("{health:?}");
+    let (all, good) = (drive.bytes.len() as u32 / 47, health.packets);
+    assert!(good > all / 2 && good < all * 3 / 4, "{good} of {all} packets");
+    assert!(health.check_errors > 0 && health.skipped_bytes > 47 * (all - good) / 2);
+    for board in BOARDS {
+        let there = board
+            .replay(&recording, Count::None)
+            .unwrap_or_else(|error| panic!("{error:#}"));
+        assert_eq!(here.messages, there.messages, "{}", board.name);
     }
 }

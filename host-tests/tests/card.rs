@@ -53,8 +53,7 @@ fn no_figure_rises() {
     }
     assert!(
         risen.is_empty(),
-        "{}\nIf it must be: cargo run --release -- card --json > host-tests/golden/card.json, with the reason in \
-         the message",
+        "{}\nIf it must be: cargo run --release -- card --bless, with the reason in the commit's message",
         risen.join("\n")
     );
 }

@@ -12,6 +12,7 @@
 pub mod command;
 pub mod link;
 pub mod pairs;
+pub mod ring;
 pub mod telemetry;
 
 use beamfix::{
@@ -129,6 +130,12 @@ impl<const N: usize> App<N> {
             Some(Command::Health) => self.turns.health_due = true,
         }
         self.health_when_due()
+    }
+
+    /// Where the robot is.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        self.turns.odometry.pose()
     }
 
     /// Tells how many bytes found no room in the board's buffers since the start.

@@ -2,5 +2,4 @@
 #![no_std]
 
 pub mod clock;
-pub mod ring;
 pub mod uart;

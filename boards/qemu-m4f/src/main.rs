@@ -2,13 +2,13 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::{Board, CONFIG};
+use beamfix_app::{Board, CONFIG, ring::Ring};
 use cortex_m::interrupt;
 use cortex_m_rt::{entry, exception};
-use qemu_m4f::{ring::Ring, uart::Uart};
+use qemu_m4f::uart::Uart;
 
-static LIDAR: Ring = Ring::new();
-static COMMANDS: Ring = Ring::new();
+static LIDAR: Ring<2048> = Ring::new();
+static COMMANDS: Ring<2048> = Ring::new();
 
 #[entry]
 fn main() -> ! {

@@ -7,7 +7,7 @@ use beamfix_app::telemetry::Cost;
 use object::{Object as _, ObjectSection as _, SectionKind};
 use serde::{Deserialize, Serialize};
 
-use super::{Board, emulator::Count, recording::Recording};
+use super::{Board, emulator::Count, recording::Recording, root};
 use crate::{
     encoder::ld06::Sensor,
     sim::drive::{Settings, drive},
@@ -94,6 +94,33 @@ pub fn measure(board: &Board, recording: &Recording) -> Result<Card> {
         instructions_max: worst.into(),
         rustc: rustc_version()?,
     })
+}
+
+/// Makes these the golden figures: `host-tests/golden/card.json` and the rows of the README's table.
+pub fn bless(cards: &[Card]) -> Result<()> {
+    let golden = root().join("host-tests/golden/card.json");
+    fs::write(&golden, serde_json::to_string_pretty(cards)? + "\n")
+        .with_context(|| golden.display().to_string())?;
+    let readme = root().join("README.md");
+    let text = fs::read_to_string(&readme).with_context(|| readme.display().to_string())?;
+    let is_row = |line: &&str| {
+        cards
+            .iter()
+            .any(|card| line.starts_with(&format!("| {} | ", card.board)))
+    };
+    let rows = text.lines().filter(is_row).count();
+    ensure!(
+        rows == cards.len(),
+        "README.md has {rows} rows of the cost table, not {}",
+        cards.len()
+    );
+    let mut new = cards.iter().map(Card::markdown);
+    let lines = text.lines().map(|line| {
+        let row = if is_row(&line) { new.next() } else { None };
+        row.unwrap_or_else(|| line.into())
+    });
+    let text: Vec<String> = lines.collect();
+    fs::write(&readme, text.join("\n") + "\n").with_context(|| readme.display().to_string())
 }
 
 /// Bytes in flash and of statics in RAM.

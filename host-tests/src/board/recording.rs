@@ -40,6 +40,11 @@ impl Recording {
         self.push(&Command::Wheels { x, y, theta });
     }
 
+    /// Asks how the parts are.
+    pub fn ask_health(&mut self) {
+        self.push(&Command::Health);
+    }
+
     /// A whole scan. It is matched when the next one starts.
     pub fn scan(&mut self, beams: &[Beam]) {
         for (k, piece) in beams.chunks(command::BEAMS).enumerate() {

@@ -12,12 +12,15 @@ use super::output;
 
 /// Flash, memory, stack and instructions of the firmware on the emulated boards.
 ///
-/// `card --json > host-tests/golden/card.json` accepts new figures.
+/// The tests compare them with `host-tests/golden/card.json`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Only this one: m4f, m0 or rv32.
     #[arg(long, value_name = "NAME")]
     board: Option<String>,
+    /// Write the figures to `host-tests/golden/card.json` and into the README's table.
+    #[arg(long, conflicts_with = "board")]
+    bless: bool,
     /// Print one JSON list.
     #[arg(long)]
     json: bool,
@@ -37,6 +40,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bar.inc(1);
     }
     bar.finish_and_clear();
+    if args.bless {
+        card::bless(&cards)?;
+    }
     let value = serde_json::to_value(&cards)?;
     let json = serde_json::to_string_pretty(&value)?;
     let text = if args.json { json } else { table(&cards) };

@@ -2,19 +2,20 @@
 
 use core::cell::RefCell;
 
-use cortex_m::interrupt::{self, Mutex};
+use critical_section::Mutex;
 use heapless::Deque;
 
-/// Up to 2048 bytes, 90 ms of an LD06: what arrives while a match is computed.
-pub struct Ring(Mutex<RefCell<Inner>>);
+/// Up to B bytes: what arrives while a match is computed. An LD06 sends 23 a millisecond at most.
+pub struct Ring<const B: usize>(Mutex<RefCell<Inner<B>>>);
 
-struct Inner {
-    bytes: Deque<u8, 2048>,
+struct Inner<const B: usize> {
+    bytes: Deque<u8, B>,
     lost: u32,
 }
 
-impl Ring {
+impl<const B: usize> Ring<B> {
     /// Empty.
+    #[must_use]
     #[allow(clippy::new_without_default, reason = "for statics")]
     pub const fn new() -> Self {
         Self(Mutex::new(RefCell::new(Inner {
@@ -30,6 +31,11 @@ impl Ring {
                 ring.lost = ring.lost.wrapping_add(1);
             }
         });
+    }
+
+    /// Counts bytes that were lost before they came here: overruns of the UART.
+    pub fn lose(&self, bytes: u32) {
+        self.with(|ring| ring.lost = ring.lost.wrapping_add(bytes));
     }
 
     /// The oldest byte.
@@ -48,7 +54,7 @@ impl Ring {
     }
 
     /// Never `None`: with interrupts masked nobody else can hold the cell.
-    fn with<R>(&self, f: impl FnOnce(&mut Inner) -> R) -> Option<R> {
-        interrupt::free(|cs| Some(f(&mut *self.0.borrow(cs).try_borrow_mut().ok()?)))
+    fn with<R>(&self, f: impl FnOnce(&mut Inner<B>) -> R) -> Option<R> {
+        critical_section::with(|cs| Some(f(&mut *self.0.borrow(cs).try_borrow_mut().ok()?)))
     }
 }
