@@ -92,7 +92,9 @@ fn damaged(bytes: &[u8]) -> Vec<u8> {
     let mut random = 1u64;
     let mut damaged = Vec::new();
     for &byte in bytes {
-        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        random = random
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
         match (random >> 33) % 300 {
             0 => {}
             1 => damaged.extend([byte, byte]),
@@ -127,7 +129,10 @@ fn a_damaged_line_costs_packets_not_the_run() {
     };
     println!("{health:?}");
     let (all, good) = (drive.bytes.len() as u32 / 47, health.packets);
-    assert!(good > all / 2 && good < all * 3 / 4, "{good} of {all} packets");
+    assert!(
+        good > all / 2 && good < all * 3 / 4,
+        "{good} of {all} packets"
+    );
     assert!(health.check_errors > 0 && health.skipped_bytes > 47 * (all - good) / 2);
     for board in BOARDS {
         let there = board

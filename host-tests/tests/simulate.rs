@@ -60,7 +60,7 @@ fn the_drive_through_the_flat_ends_within_3_cm_and_half_a_degree() {
         },
         ..OdometryConfig::DEFAULT
     };
-    let mut pipeline = Pipeline::<{ beamfix_app::BEAMS }>::new(config);
+    let mut pipeline = Pipeline::<456>::new(config);
     let origin = run.moments[turns[0].ends_at - 1].truth;
     let mut error = (0.0, 0.0);
     for turn in &turns {
