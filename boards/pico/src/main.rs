@@ -47,7 +47,7 @@ fn main() -> ! {
 
     let mut p = pac::Peripherals::take().expect("the first to take them");
     let mut watchdog = Watchdog::new(p.WATCHDOG);
-    let clocks = init_clocks_and_plls(
+    let Ok(clocks) = init_clocks_and_plls(
         CRYSTAL,
         p.XOSC,
         p.CLOCKS,
@@ -55,9 +55,9 @@ fn main() -> ! {
         p.PLL_USB,
         &mut p.RESETS,
         &mut watchdog,
-    )
-    .ok()
-    .expect("the crystal runs");
+    ) else {
+        panic!("the crystal does not run");
+    };
     let sio = Sio::new(p.SIO);
     let pins = Pins::new(p.IO_BANK0, p.PADS_BANK0, sio.gpio_bank0, &mut p.RESETS);
     let clock = clocks.peripheral_clock.freq();
