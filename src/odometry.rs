@@ -199,15 +199,7 @@ impl<const N: usize> Odometry<N> {
     pub fn update(&mut self, scan: &Scan<N>, wheels: Option<Pose>) -> Step {
         let seconds = self.elapsed(scan);
         let motion = self.predicted_motion(wheels, seconds);
-        let config = PointsConfig {
-            min_range: self.config.min_range,
-            max_range: self.config.max_range,
-            upside_down: self.config.mount.upside_down,
-        };
-        let during = Twist::from_motion(motion, seconds);
-        self.points
-            .assign(scan, self.config.mount.lidar_twist(during), &config);
-
+        self.unbend(scan, motion, seconds);
         let predicted = self.pose * motion;
         let predicted_covariance = self.grown(motion);
         // Wheels that slip tell a wrong motion; to go on as before may then be the better guess.
@@ -218,7 +210,8 @@ impl<const N: usize> Odometry<N> {
                     .matched(self.pose * self.twist.over(seconds))
                     .map_err(|_| refusal),
                 None => Err(refusal),
-            });
+            })
+            .map(|found| self.matched_again(scan, predicted, seconds, found));
         let before = self.pose;
         match &outcome {
             Ok(found) => {
@@ -257,6 +250,40 @@ impl<const N: usize> Odometry<N> {
             return 0.0;
         }
         micros as f32 * 1e-6
+    }
+
+    /// Places the scan's points as seen from its end, the robot having moved by `motion` since the last scan's end.
+    fn unbend(&mut self, scan: &Scan<N>, motion: Pose, seconds: f32) {
+        let config = PointsConfig {
+            min_range: self.config.min_range,
+            max_range: self.config.max_range,
+            upside_down: self.config.mount.upside_down,
+        };
+        let twist = Twist::from_motion(motion, seconds);
+        let lidar_twist = self.config.mount.lidar_twist(twist);
+        self.points.assign(scan, lidar_twist, &config);
+    }
+
+    /// Matches once more where the first match says that a wrong motion has bent the scan: a wheel slipped.
+    ///
+    /// Below the threshold the wheels know the motion during a scan better than the match does, whose own error of
+    /// heading would come back. In the simulated flat this takes a third off the final error.
+    fn matched_again(
+        &mut self,
+        scan: &Scan<N>,
+        predicted: Pose,
+        seconds: f32,
+        found: Match,
+    ) -> Match {
+        /// What a slip turns a robot by in one scan, and noise does not (rad).
+        const SLIP: f32 = 0.02;
+        let (pose, _) = self.placed(&found);
+        let slipped = math::abs(predicted.between(pose).theta) > SLIP;
+        if !(slipped && scan.duration() > 0.0 && seconds > 0.0) {
+            return found;
+        }
+        self.unbend(scan, self.pose.between(pose), seconds);
+        self.matched(pose).unwrap_or(found)
     }
 
     /// Motion of the robot since the last scan by its wheels, else by going on as before.
