@@ -32,6 +32,7 @@ use minimisation::Minimise;
 use normals::Surface;
 use rejection::Reject;
 use selection::Select;
+use verdict::Determined;
 use weighting::Weigh;
 
 /// A choice for every stage, and when to stop.
@@ -192,8 +193,9 @@ where
     chosen.fill(false);
     stages.selection.select(current, chosen);
     stages.correspondence.prepare(reference);
-    let (mut pose, mut last, mut passes) = (guess, Pose::IDENTITY, 0);
-    while passes < limits.iterations {
+    let lever = verdict::mean_range(current.points);
+    let (mut pose, mut passes) = (guess, 0);
+    loop {
         passes += 1;
         associate(stages, reference, current, chosen, pose, pairs);
         for pair in pairs.iter_mut() {
@@ -201,21 +203,16 @@ where
         }
         stages.rejection.reject(pairs, reference);
         verdict::enough_pairs(pairs, &limits)?;
+        let determined = Determined::by(pairs, reference, pose, lever)?;
         let step = stages.minimisation.step(pairs, reference, pose);
-        last = step.ok_or(MatchError::Degenerate)?;
-        pose = Pose::new(pose.x + last.x, pose.y + last.y, pose.theta + last.theta);
-        if last.distance() < limits.translation && math::abs(last.theta) < limits.rotation {
-            break;
+        let step = determined.part_of(step.ok_or(MatchError::Degenerate)?);
+        pose = Pose::new(pose.x + step.x, pose.y + step.y, pose.theta + step.theta);
+        let short = step.distance() < limits.translation && math::abs(step.theta) < limits.rotation;
+        if short || passes >= limits.iterations {
+            let poses = [guess, pose, step];
+            return verdict::judge(pairs, current, &determined, poses, passes, &limits);
         }
     }
-    verdict::judge(
-        pairs,
-        reference,
-        current,
-        [guess, pose, last],
-        passes,
-        &limits,
-    )
 }
 
 /// Pairs every chosen point, at `pose`, with its correspondence.

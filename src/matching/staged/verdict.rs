@@ -55,11 +55,52 @@ pub(super) fn enough_pairs(pairs: &[Pair], limits: &Limits) -> Result<(), MatchE
     Ok(())
 }
 
+/// What the pairs determine: the information but for its scale, and the direction that they leave open, if one.
+pub(super) struct Determined {
+    h: Sym3,
+    /// With its curvature.
+    open: Option<(f32, [f32; 3])>,
+    lever: f32,
+}
+
+impl Determined {
+    /// `lever`: see [`mean_range`].
+    pub fn by(
+        pairs: &[Pair],
+        reference: Cloud<'_>,
+        pose: Pose,
+        lever: f32,
+    ) -> Result<Self, MatchError> {
+        let (h, _) = normal_equations(pairs, reference, pose);
+        let [least, middle, _] = h.theta_scaled(1.0 / lever).eigen();
+        let weight = counting(pairs).fold(0.0, |sum, pair| sum + pair.weight);
+        let threshold = WEAK_SHARE * weight;
+        if !(middle.0 >= threshold) {
+            return Err(MatchError::Degenerate);
+        }
+        let open = (least.0 < threshold).then_some(least);
+        Ok(Self { h, open, lever })
+    }
+
+    /// The motion without its part along the open direction: Zhang, Kaess, Singh, ICRA 2016.
+    pub fn part_of(&self, motion: Pose) -> Pose {
+        let Some((_, [x, y, t])) = self.open else {
+            return motion;
+        };
+        let along = x * motion.x + y * motion.y + t * motion.theta * self.lever;
+        Pose::new(
+            motion.x - along * x,
+            motion.y - along * y,
+            motion.theta - along * t / self.lever,
+        )
+    }
+}
+
 /// Judges the pose that the last pass led to, and keeps the guess along a direction that nothing determines.
 pub(super) fn judge(
     pairs: &[Pair],
-    reference: Cloud<'_>,
     current: Cloud<'_>,
+    determined: &Determined,
     [guess, pose, step]: [Pose; 3],
     iterations: u8,
     limits: &Limits,
@@ -68,7 +109,6 @@ pub(super) fn judge(
         let step = step.distance() + math::abs(step.theta);
         return Err(MatchError::NotConverged { step });
     }
-    let (h, _) = normal_equations(pairs, reference, pose);
     let (mut weight, mut squares, mut score) = (0.0, 0.0, 0.0);
     for pair in counting(pairs) {
         weight += pair.weight;
@@ -80,24 +120,26 @@ pub(super) fn judge(
     }
     let residual = math::sqrt(squares / weight);
     let noise = math::max(residual * residual, limits.range_sigma * limits.range_sigma);
-    let lever = mean_range(current.points);
-    let eigen = h.theta_scaled(1.0 / lever).eigen();
-    let threshold = WEAK_SHARE * weight;
-    if !(eigen[1].0 >= threshold) {
-        return Err(MatchError::Degenerate);
-    }
-    let weak = (eigen[0].0 < threshold).then(|| WeakDirection {
-        direction: eigen[0].1,
-        lever,
-        sigma: math::sqrt(noise / math::max(eigen[0].0, 1e-3)),
+    let weak = determined.open.map(|(curvature, direction)| WeakDirection {
+        direction,
+        lever: determined.lever,
+        sigma: math::sqrt(noise / math::max(curvature, 1e-3)),
     });
-    let pose = weak.map_or(pose, |weak| keep(&weak, guess, pose));
-    let information = h.scaled(1.0 / noise);
+    let moved = determined.part_of(Pose::new(
+        pose.x - guess.x,
+        pose.y - guess.y,
+        pose.theta - guess.theta,
+    ));
+    let information = determined.h.scaled(1.0 / noise);
     // A direction that is not determined at all still has a finite variance: 10 m, 10 rad.
     let bounded = information.plus(&Sym3::diagonal(0.01, 0.01, 0.01));
     let covariance = bounded.inverse().ok_or(MatchError::Degenerate)?;
     Ok(Match {
-        pose,
+        pose: Pose::new(
+            guess.x + moved.x,
+            guess.y + moved.y,
+            guess.theta + moved.theta,
+        ),
         covariance: Covariance(covariance),
         information: Information(information),
         inliers: counting(pairs).count() as u16,
@@ -112,20 +154,8 @@ pub(super) fn judge(
     })
 }
 
-/// The pose with the guess's part along the weak direction: Zhang, Kaess, Singh, ICRA 2016.
-fn keep(weak: &WeakDirection, guess: Pose, pose: Pose) -> Pose {
-    let [x, y, t] = weak.direction;
-    let turned = math::wrap_angle(pose.theta - guess.theta) * weak.lever;
-    let along = x * (pose.x - guess.x) + y * (pose.y - guess.y) + t * turned;
-    Pose::new(
-        pose.x - along * x,
-        pose.y - along * y,
-        pose.theta - along * t / weak.lever,
-    )
-}
-
 /// Mean distance of the points (m), which makes a heading comparable with a distance.
-fn mean_range(points: &[ScanPoint]) -> f32 {
+pub(super) fn mean_range(points: &[ScanPoint]) -> f32 {
     let sum = points
         .iter()
         .fold(0.0, |sum, p| sum + f32::from(p.range) * 1e-3);
