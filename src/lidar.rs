@@ -25,6 +25,7 @@ pub mod model;
 pub mod motor;
 pub mod packet;
 pub mod parser;
+pub mod ring;
 pub mod rplidar;
 pub mod scip;
 pub mod sick;

@@ -2,6 +2,7 @@
 
 pub mod assembler;
 pub mod beam;
+pub mod bins;
 pub mod filter;
 pub mod mount;
 pub mod points;

@@ -2,10 +2,14 @@
 
 use std::collections::HashSet;
 
-use beamfix::lidar::{Packet, Protocol, ld06};
+use beamfix::lidar::timing::Pace;
+use beamfix::lidar::{
+    Family, Format, Model, Packet, Protocol, camsense, coin_d4, delta, ld06, lds01, rplidar, sick,
+    xv11, ydlidar,
+};
 use host_tests::encoder::{self, Echo, Encoder, damage};
 use proptest::prelude::*;
-use rand::{Rng, SeedableRng};
+use rand::{Rng, SeedableRng, seq::IndexedRandom};
 use rand_chacha::ChaCha8Rng;
 
 /// A room without symmetry.
@@ -78,6 +82,119 @@ fn random_bytes_give_no_frames() {
     }
     let skipped = parser.counters().skipped_bytes as usize;
     assert_eq!(skipped + parser.pending_bytes(), 2_000_000);
+}
+
+/// Gives a format frames of any content, as if their check codes were right.
+fn hammer<F: Format + Clone>(parser_format: &F, lengths: &[usize], header: &[(usize, u8)]) {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let mut format = parser_format.clone();
+    let mut pace = Pace::new(115_200);
+    for round in 0..3000 {
+        let length = *lengths.choose(&mut rng).expect("lengths");
+        let edge = [0, 0xff, 0x7f, 0x80].choose(&mut rng).copied();
+        let mut frame: Vec<u8> = (0..length)
+            .map(|_| {
+                if rng.random_range(0..3) == 0 {
+                    edge.expect("edges")
+                } else {
+                    rng.random()
+                }
+            })
+            .collect();
+        for &(at, byte) in header {
+            frame[at] = byte;
+        }
+        if round % 7 == 0 {
+            pace.arrived(rng.random());
+        }
+        let Some(packet) = format.packet(&frame, round % 5 > 0, &mut pace) else {
+            continue;
+        };
+        let beams = packet.beams().count();
+        assert_eq!(beams, packet.samples().count());
+        assert!(packet.turn_start().is_none_or(|start| start < beams));
+        for sample in packet.samples() {
+            assert!((0.0..360.0).contains(&sample.angle_deg), "{sample:?}");
+            assert!(sample.range_mm.is_none_or(|mm| mm > 0.0), "{sample:?}");
+        }
+        packet.speed_rpm();
+    }
+}
+
+#[test]
+fn no_content_of_a_frame_is_too_much() {
+    for model in [Model::LD06, Model::LD14, Model::LDS02] {
+        hammer(ld06::Parser::for_model(&model).format(), &[47], &[]);
+    }
+    hammer(rplidar::Parser::new().format(), &[5], &[]);
+    let express = rplidar::capsule::Parser::express(&Model::RPLIDAR_EXPRESS);
+    hammer(express.format(), &[84], &[]);
+    hammer(express.format(), &[84], &[(3, 0x10)]);
+    let dense = rplidar::capsule::Parser::dense(&Model::RPLIDAR_DENSE);
+    hammer(dense.format(), &[84], &[(3, 0x10)]);
+    let ultra = rplidar::ultra::UltraParser::for_model(&Model::RPLIDAR_ULTRA);
+    hammer(ultra.format(), &[132], &[(3, 0x10)]);
+    let ultra_dense = rplidar::ultra::UltraDenseParser::for_model(&Model::RPLIDAR_ULTRADENSE);
+    hammer(ultra_dense.format(), &[170], &[(9, 0x10)]);
+    hammer(
+        rplidar::hq::Parser::for_model(&Model::RPLIDAR_HQ).format(),
+        &[781],
+        &[],
+    );
+    for (model, lengths) in [
+        (Model::X4, [12, 90, 170]),
+        (Model::G6, [12, 90, 170]),
+        (Model::G2, [13, 130, 250]),
+        (Model::TMINI, [13, 130, 250]),
+    ] {
+        let parser = ydlidar::Parser::for_model(&model);
+        for length in lengths {
+            let samples = match model.family {
+                Family::Ydlidar(samples) => usize::from(samples.bytes),
+                _ => 2,
+            };
+            hammer(
+                parser.format(),
+                &[length],
+                &[(3, ((length - 10) / samples) as u8)],
+            );
+        }
+    }
+    hammer(lds01::Parser::for_model(&Model::LDS01).format(), &[42], &[]);
+    hammer(xv11::Parser::for_model(&Model::XV11).format(), &[22], &[]);
+    hammer(
+        xv11::early::Parser::for_model(&Model::XV11_EARLY).format(),
+        &[1446],
+        &[],
+    );
+    let x1 = camsense::Parser::for_model(&Model::X1);
+    for (kind, count) in [(3, 8), (7, 12), (2, 40), (7, 40)] {
+        let size = if kind == 7 { 4 } else { kind };
+        let length = 12 + count * size;
+        let header = [
+            (2, kind as u8),
+            (3, count as u8),
+            (7, 0xb0),
+            (length - 3, 0xc0),
+        ];
+        hammer(x1.format(), &[length], &header);
+    }
+    let delta = delta::Parser::for_model(&Model::DELTA_2A);
+    for version in [0x01, 0x10] {
+        hammer(
+            delta.format(),
+            &[17, 93, 156, 1026],
+            &[(3, version), (5, 0xad)],
+        );
+        hammer(delta.format(), &[11], &[(3, version), (5, 0xae)]);
+    }
+    hammer(
+        coin_d4::Parser::for_model(&Model::COIN_D4).format(),
+        &[85],
+        &[(3, 25)],
+    );
+    let sick = sick::Parser::for_model(&Model::LMS200);
+    hammer(sick.format(), &[7, 9, 372, 732, 812], &[(4, 0xb0)]);
 }
 
 proptest! {

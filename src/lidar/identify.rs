@@ -178,7 +178,11 @@ fn ldrobot_by_pace(bytes: &[u8]) -> &'static Model {
         }
         speed = packet.speed_deg_per_s;
     }
-    match (frames * 12_000).checked_div(elapsed_ms).unwrap_or(4500) {
+    match frames
+        .saturating_mul(12_000)
+        .checked_div(elapsed_ms)
+        .unwrap_or(4500)
+    {
         0..=3200 if speed < 2000 => &Model::LDS02,
         0..=3200 => &Model::LD14,
         3201..=4250 => &Model::LD14P,

@@ -145,6 +145,9 @@ impl Turns {
     /// Number of the first of `count` angles, `step` apart, that is more than half a turn less than the one before.
     pub(crate) fn find(&mut self, first: u32, step: u32, count: u16) -> Option<u16> {
         const HALF: u32 = 1 << 31;
+        if count == 0 {
+            return None;
+        }
         let before = self.last;
         let span = step.wrapping_mul(u32::from(count.saturating_sub(1)));
         self.last = first.wrapping_add(span);

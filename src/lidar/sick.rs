@@ -115,7 +115,7 @@ impl super::Format for Format {
         let turns = 100 / step_cdeg as u16;
         packet.view.period_q8 = DEGREE_Q8 / u32::from(turns);
         packet.view.first_us = pace.first_us(360 * turns, DEGREE_Q8, frame.len() as u16);
-        packet.view.turn_start = Some(0);
+        packet.view.turn_start = (count > 0).then_some(0);
         Some(packet)
     }
 }

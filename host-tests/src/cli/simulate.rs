@@ -9,6 +9,7 @@ use anyhow::{Context, Result, bail};
 use beamfix::geometry::Pose;
 use beamfix::odometry::{Counters, OdometryConfig};
 use beamfix::scan::Mount;
+use beamfix::scan::bins::{Bins, Keep};
 use host_tests::decode::{self, Summary};
 use host_tests::picture;
 use host_tests::pipeline::Pipeline;
@@ -42,7 +43,7 @@ pub struct Args {
     json: bool,
 }
 
-/// Most beams of a turn that are matched; of a finer sensor's, every second, third, …
+/// Most beams of a turn that are matched; of a finer sensor's, one for each of so many directions.
 const MOST_BEAMS: usize = 1024;
 /// Every so many scans are drawn.
 const DRAWN: usize = 4;
@@ -67,8 +68,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let drive = sim::drive(&settings, encoder::for_model(model).as_mut());
     let (mut turns, summary) = capture::turns(&args.lidar, &drive.bytes)?;
     for turn in &mut turns {
-        let every = turn.beams.len().div_ceil(MOST_BEAMS).max(1);
-        turn.beams = turn.beams.iter().copied().step_by(every).collect();
+        if turn.beams.len() > MOST_BEAMS {
+            let mut bins = Bins::new(MOST_BEAMS as u16, Keep::First);
+            let kept = turn.beams.iter().filter_map(|beam| bins.push(*beam, false));
+            turn.beams = kept.map(|(beam, _)| beam).collect();
+        }
     }
     let size = size::fitting(turns.iter().map(|turn| &turn.beams[..]));
     sized!(size, follow(args, &settings, drive, &turns, &summary))
