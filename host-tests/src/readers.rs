@@ -9,6 +9,7 @@ pub mod carmen;
 pub mod clock;
 pub mod lscan;
 pub mod pairs;
+pub mod ros;
 
 use std::path::Path;
 
@@ -70,12 +71,14 @@ impl Log {
     }
 }
 
-/// Reads a CARMEN text log or an `.lscan` file, packed with gzip or not; the content tells which.
+/// Reads a CARMEN text log, an `.lscan` file or a ROS 2 recording (MCAP), packed with gzip or not; the content tells which.
 pub fn read(path: &Path) -> Result<Log> {
     let content = bytes::load(path)?;
     let name = path.display();
     let mut log = if content.bytes.starts_with(lscan::MAGIC) {
         lscan::parse(&content.bytes).map_err(|error| error.context(name.to_string()))?
+    } else if content.bytes.starts_with(ros::MAGIC) {
+        ros::parse(&content.bytes)
     } else {
         carmen::parse(&content.bytes)
     };
@@ -91,7 +94,7 @@ pub fn read(path: &Path) -> Result<Log> {
             ),
             (None, Some(cut)) => bail!("{name}: no usable scan: {cut}"),
             (None, None) => bail!(
-                "{name}: no usable scan: no FLASER or ROBOTLASER1 line in {lines} lines, and not an .lscan file"
+                "{name}: no usable scan: no FLASER or ROBOTLASER1 line in {lines} lines, and neither an .lscan nor an MCAP file"
             ),
         }
     }
