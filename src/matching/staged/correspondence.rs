@@ -101,7 +101,7 @@ impl Correspond for ClosestCompatible {
 /// The reference surface that the point's normal meets first, either way: good on smooth surfaces, bad on clutter,
 /// whose normals point anywhere.
 ///
-/// Looks at all the reference's segments: about 10 operations each.
+/// Looks at all the reference's segments.
 #[derive(Debug, Clone, Copy)]
 pub struct NormalShooting {
     /// Farthest that is shot (m). Default 0.5.

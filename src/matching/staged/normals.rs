@@ -48,12 +48,14 @@ impl Surface {
 /// Lays a line through each of `points` and up to `half` neighbours on each side, on the same run.
 ///
 /// Where those bend (a corner) the line goes through the neighbours on one side alone; where these bend too, or a run
-/// has fewer than three points, there is none. As many surfaces as fit are filled; about 30·`half` operations a point.
+/// has fewer than three points, there is none. As many surfaces as fit are filled.
 pub fn lay<'a>(points: &'a [ScanPoint], half: usize, surfaces: &'a mut [Surface]) -> Cloud<'a> {
     let mut rest = points;
     let mut room = surfaces.iter_mut();
     while !rest.is_empty() {
-        let (run, others) = rest.split_at(run_length(rest).clamp(1, rest.len()));
+        let Some((run, others)) = rest.split_at_checked(run_length(rest).max(1)) else {
+            break;
+        };
         for (i, surface) in (0..run.len()).zip(room.by_ref()) {
             *surface = at(run, i, half);
         }
@@ -61,8 +63,8 @@ pub fn lay<'a>(points: &'a [ScanPoint], half: usize, surfaces: &'a mut [Surface]
     }
     let filled = points.len().min(surfaces.len());
     Cloud {
-        points: points.split_at(filled).0,
-        surfaces: surfaces.split_at(filled).0,
+        points: points.get(..filled).unwrap_or_default(),
+        surfaces: surfaces.get(..filled).unwrap_or_default(),
     }
 }
 
@@ -95,7 +97,7 @@ fn at(run: &[ScanPoint], i: usize, half: usize) -> Surface {
     };
     let edge = i == 0 || i + 1 == run.len();
     let place = Point::new(f32::from(point.x) * 1e-3, f32::from(point.y) * 1e-3);
-    let last = run.len() - 1;
+    let last = run.len().saturating_sub(1);
     let span = |from: usize, to: usize| run.get(from..=to.min(last));
     let (centred, before, after) = (
         span(i.saturating_sub(half), i + half),

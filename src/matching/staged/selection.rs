@@ -194,7 +194,7 @@ impl Select for NormalSpace {
         let mut counts = [0u16; BINS];
         for k in current.surfaces.iter().filter_map(bin) {
             if let Some(count) = counts.get_mut(k) {
-                *count += 1;
+                *count = count.saturating_add(1);
             }
         }
         let shares = self.shares(counts);
@@ -208,8 +208,8 @@ impl Select for NormalSpace {
             };
             // Spread evenly over the bin's points: the i-th is taken where i·share/count steps on.
             let steps = |i: u16| u32::from(i) * u32::from(*share) / u32::from((*count).max(1));
-            *slot = steps(*seen + 1) > steps(*seen);
-            *seen += 1;
+            *slot = steps(seen.saturating_add(1)) > steps(*seen);
+            *seen = seen.saturating_add(1);
         }
     }
 }

@@ -58,7 +58,7 @@ pub(super) fn enough_pairs(pairs: &[Pair], limits: &Limits) -> Result<(), MatchE
 /// What the pairs determine: the information but for its scale, and the direction that they leave open, if one.
 pub(super) struct Determined {
     h: Sym3,
-    /// With its curvature.
+    /// Curvature and unit vector over (x, y, heading · lever).
     open: Option<(f32, [f32; 3])>,
     lever: f32,
 }
@@ -80,6 +80,23 @@ impl Determined {
         }
         let open = (least.0 < threshold).then_some(least);
         Ok(Self { h, open, lever })
+    }
+
+    /// The information but for its scale, without the open direction's: that little is the normals' noise.
+    fn known(&self) -> Sym3 {
+        let Some((curvature, [x, y, t])) = self.open else {
+            return self.h;
+        };
+        let t = t * self.lever;
+        let outer = Sym3 {
+            xx: x * x,
+            xy: x * y,
+            xt: x * t,
+            yy: y * y,
+            yt: y * t,
+            tt: t * t,
+        };
+        self.h.plus(&outer.scaled(-curvature))
     }
 
     /// The motion without its part along the open direction: Zhang, Kaess, Singh, ICRA 2016.
@@ -120,20 +137,24 @@ pub(super) fn judge(
     }
     let residual = math::sqrt(squares / weight);
     let noise = math::max(residual * residual, limits.range_sigma * limits.range_sigma);
-    let weak = determined.open.map(|(curvature, direction)| WeakDirection {
-        direction,
-        lever: determined.lever,
-        sigma: math::sqrt(noise / math::max(curvature, 1e-3)),
-    });
     let moved = determined.part_of(Pose::new(
         pose.x - guess.x,
         pose.y - guess.y,
         pose.theta - guess.theta,
     ));
-    let information = determined.h.scaled(1.0 / noise);
+    let information = determined.known().scaled(1.0 / noise);
     // A direction that is not determined at all still has a finite variance: 10 m, 10 rad.
     let bounded = information.plus(&Sym3::diagonal(0.01, 0.01, 0.01));
     let covariance = bounded.inverse().ok_or(MatchError::Degenerate)?;
+    let weak = determined.open.map(|(_, direction)| {
+        let [x, y, t] = direction;
+        let variance = covariance.quadratic([x, y, t * determined.lever]);
+        WeakDirection {
+            direction,
+            lever: determined.lever,
+            sigma: math::sqrt(variance),
+        }
+    });
     Ok(Match {
         pose: Pose::new(
             guess.x + moved.x,

@@ -28,8 +28,8 @@ impl Place {
 
     fn square(self, point: &ScanPoint) -> u64 {
         let (dx, dy) = (
-            i64::from(self.x - i32::from(point.x)),
-            i64::from(self.y - i32::from(point.y)),
+            i64::from(self.x) - i64::from(point.x),
+            i64::from(self.y) - i64::from(point.y),
         );
         (dx * dx + dy * dy) as u64
     }
@@ -91,23 +91,21 @@ impl Sweep {
     /// Looks at the bearings of `points` once. A scan whose order is lost still works, at the price of brute force.
     #[must_use]
     pub fn of(points: &[ScanPoint]) -> Self {
-        let total: i32 = points
-            .windows(2)
-            .map(|pair| turn_between(pair, false))
-            .sum();
+        let steps = points.windows(2).map(|pair| turn_between(pair, false));
+        let total = steps.fold(0i32, |sum, step| sum.saturating_add(step));
         let falling = total < 0;
-        let seam = (1 << 16) - total.saturating_abs();
+        let seam = (1i32 << 16).saturating_sub(total.saturating_abs());
         // Twice around, so that the seam is looked at, too.
-        let (mut at, mut highest, mut slack) = (0i32, 0, 0);
+        let (mut at, mut highest, mut slack) = (0i32, 0i32, 0i32);
         for lap in 0..2 {
             if lap == 1 {
                 at = at.saturating_add(seam);
-                slack = slack.max(highest - at);
+                slack = slack.max(highest.saturating_sub(at));
             }
             for pair in points.windows(2) {
                 at = at.saturating_add(turn_between(pair, falling));
                 highest = highest.max(at);
-                slack = slack.max(highest - at);
+                slack = slack.max(highest.saturating_sub(at));
             }
         }
         Self {
@@ -161,7 +159,7 @@ impl Sweep {
             }
         };
         look(start, &mut best);
-        let mut left = points.len() - 1;
+        let mut left = points.len().saturating_sub(1);
         while left > 0 && (up.open || down.open) {
             for (walk, backward) in [(&mut up, false), (&mut down, true)] {
                 if left > 0 && walk.open {
@@ -195,7 +193,7 @@ impl Sweep {
     }
 
     fn advance(&self, points: &[ScanPoint], walk: &mut Walk, backward: bool) {
-        let last = points.len() - 1;
+        let last = points.len().saturating_sub(1);
         let (from, to, over_seam) = if backward {
             let before = walk.index.checked_sub(1).unwrap_or(last);
             (before, walk.index, walk.index == 0)
