@@ -170,8 +170,14 @@ impl<const N: usize> App<N> {
 }
 
 impl Lidar {
-    fn push<const N: usize>(&mut self, byte: u8, turns: &mut Turns<N>) {
+    /// Apart, so that what the parser needs is not on the stack during a match.
+    #[inline(never)]
+    fn receive(&mut self, byte: u8) {
         self.packet = self.parser.push(byte);
+    }
+
+    fn push<const N: usize>(&mut self, byte: u8, turns: &mut Turns<N>) {
+        self.receive(byte);
         if let Some(packet) = &self.packet {
             let start = packet.turn_start();
             for (k, beam) in packet.beams().enumerate() {
