@@ -8,6 +8,8 @@ use beamfix::lidar::{
 };
 use beamfix::scan::Beam;
 
+use crate::timed;
+
 /// Names that [`decode`] knows.
 pub fn names() -> impl Iterator<Item = &'static str> {
     Model::ALL.iter().map(|model| model.name)
@@ -78,7 +80,8 @@ pub fn model(name: &str, bytes: &[u8]) -> Result<&'static Model, DecodeError> {
         return Model::named(name).ok_or_else(|| DecodeError::UnknownLidar(name.into()));
     }
     // A second of the fastest line holds what there is to know.
-    let start = bytes.get(..100_000).unwrap_or(bytes);
+    let bytes = timed::plain(bytes);
+    let start = bytes.get(..100_000).unwrap_or(&bytes);
     match identify::identify(start) {
         Some(finding) => Ok(finding.model),
         None => {
@@ -121,7 +124,8 @@ pub fn with_parser<W: WithParser>(model: &Model, with: W) -> W::Output {
     }
 }
 
-/// Decodes `bytes` of the sensor called `name`, or of the one they are from for `auto`; each measurement goes to `sink` in order.
+/// Decodes `bytes` of the sensor called `name`, or of the one they are from for `auto`; each measurement goes to `sink`
+/// in order. Where the bytes have times ([`timed`]), so have the measurements of sensors without a clock.
 pub fn decode(name: &str, bytes: &[u8], sink: &mut dyn FnMut(Row)) -> Result<Summary, DecodeError> {
     let model = model(name, bytes)?;
     // A scanner that does not see all around counts to both sides.
@@ -146,9 +150,14 @@ impl WithParser for Decoding<'_> {
 
     fn run<P: Protocol>(self, mut parser: P) -> Summary {
         let mut summary = Summary::default();
-        for &byte in self.bytes {
-            if let Some(packet) = parser.push(byte) {
-                summary.take(&packet, self.is_signed, self.sink);
+        for piece in timed::pieces(self.bytes) {
+            if let Some(time_us) = piece.time_us {
+                parser.arrived(time_us as u32);
+            }
+            for &byte in piece.bytes {
+                if let Some(packet) = parser.push(byte) {
+                    summary.take(&packet, self.is_signed, self.sink);
+                }
             }
         }
         while let Some(packet) = parser.pull() {

@@ -16,3 +16,4 @@ pub mod score;
 pub mod shared;
 pub mod sim;
 pub mod size;
+pub mod timed;

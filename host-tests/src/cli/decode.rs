@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
 use beamfix::lidar::identify;
-use host_tests::{decode, readers::bytes};
+use host_tests::{decode, readers::bytes, timed};
 use serde_json::json;
 
 use super::output;
@@ -56,7 +56,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 .map_or(String::new(), |path| path.display().to_string())
         })?;
     // A second of the fastest line says what is wrong with it.
-    let start = content.bytes.get(..100_000).unwrap_or(&content.bytes);
+    let bytes = timed::plain(&content.bytes);
+    let start = bytes.get(..100_000).unwrap_or(&bytes);
     let hints: Vec<String> = identify::hints(model, start)
         .map(|hint| hint.to_string())
         .collect();
@@ -64,7 +65,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         summary.packets > 0,
         "{name}: no packet of an {} in {} bytes; {} failed their check: {}",
         model.name,
-        content.bytes.len(),
+        bytes.len(),
         summary.check_errors,
         hints.join("; ")
     );
@@ -77,7 +78,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         points,
     } = summary;
     let value = json!({
-        "lidar": model.name, "hints": hints, "bytes": content.bytes.len(), "packets": packets, "check_errors": check_errors,
+        "lidar": model.name, "hints": hints, "bytes": bytes.len(), "packets": packets, "check_errors": check_errors,
         "skipped_bytes": skipped_bytes, "tail_bytes": tail_bytes, "scans": scans, "points": points,
     });
     let mut text = format!(
