@@ -1,8 +1,8 @@
 //! Iterative closest point with every stage a choice: for comparing, teaching, and scenes that want another mixture.
 //!
 //! The stages are those of Rusinkiewicz and Levoy (3DIM 2001). Each is a small trait with a type a choice; what is not
-//! chosen costs no flash. [`icp`](super::icp) is one fixed mixture in integers, several times faster: take it unless
-//! it lacks something.
+//! chosen costs no flash. [`icp`](super::icp) is one fixed mixture in integers, made for the smallest
+//! boards: take it unless it lacks something.
 //!
 //! | stage | default | choices |
 //! | --- | --- | --- |
@@ -287,4 +287,18 @@ fn first<T>(slice: &[T], most: usize) -> &[T] {
 fn first_mut<T>(slice: &mut [T], most: usize) -> &mut [T] {
     let most = most.min(slice.len());
     slice.get_mut(..most).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::matching::virtual_scan::VirtualScan;
+
+    #[test]
+    fn the_buffers_are_as_large_as_said() {
+        assert!(size_of::<Workspace<360>>() <= 77 * 360 + 16);
+        assert!(size_of::<VirtualScan<360>>() <= 20 * 360 + 16);
+        assert_eq!(size_of::<correspondence::Projection<360>>(), 2 * 360);
+        assert_eq!(size_of::<rejection::Trimmed>(), 148);
+    }
 }

@@ -160,7 +160,7 @@ impl Correspond for NormalShooting {
 /// The reference point seen in the same direction: by far the cheapest, and with point-to-line the one that slides
 /// best. Wants a guess within a few degrees and few occlusions.
 ///
-/// 2·B + 8 bytes; B is best the number of beams of a full turn.
+/// 2·B bytes; B is best the number of beams of a full turn.
 #[derive(Debug, Clone, Copy)]
 pub struct Projection<const B: usize> {
     /// Index of the point seen in each direction, [`NOTHING`] for none.
