@@ -250,3 +250,41 @@ fn abs_min_max() {
     );
     assert!(math::min(1.0, f32::NAN).is_nan() && math::max(1.0, f32::NAN).is_nan());
 }
+
+#[test]
+fn sin_cos_q15_fine_at_all_angles() {
+    let mut largest = 0.0f64;
+    for turn in (0..=u32::MAX).step_by(4001) {
+        let angle = TAU * f64::from(turn) / 4_294_967_296.0;
+        let (s, c) = math::sin_cos_q15_fine(turn);
+        for (found, exact) in [(s, angle.sin()), (c, angle.cos())] {
+            let error = (f64::from(found) - 32768.0 * exact).abs();
+            largest = largest.max(error);
+            assert!(error <= 1.7, "{turn}: {found}, exactly {}", 32768.0 * exact);
+        }
+    }
+    println!("sin_cos_q15_fine: {largest:.3} of the last place, stated 1.7");
+}
+
+#[test]
+fn reciprocal_and_rough_length() {
+    let mut largest = 0.0f64;
+    for x in 128..=32_767u32 {
+        let error = f64::from(math::reciprocal(x)) * f64::from(x) / f64::from(1 << 24) - 1.0;
+        largest = largest.max(error.abs());
+    }
+    println!("reciprocal: {:.3} %, stated 0.5", 100.0 * largest);
+    assert!(largest <= 0.005, "reciprocal: {largest}");
+
+    largest = 0.0;
+    for scale in [1000.0, f64::from(1 << 16), f64::from(1 << 28)] {
+        for k in 0..100_000 {
+            let angle = TAU * f64::from(k) / 100_000.0;
+            let (x, y) = ((scale * angle.cos()) as i32, (scale * angle.sin()) as i32);
+            let exact = f64::from(x).hypot(f64::from(y));
+            largest = largest.max((f64::from(math::rough_length(x, y)) / exact - 1.0).abs());
+        }
+    }
+    println!("rough_length: {:.3} %, stated 3", 100.0 * largest);
+    assert!(largest <= 0.03, "rough_length: {largest}");
+}
