@@ -4,6 +4,7 @@ pub mod bench;
 pub mod card;
 pub mod drivers;
 pub mod emulator;
+pub mod fields;
 pub mod recording;
 pub mod stream;
 

@@ -83,7 +83,7 @@ impl<const N: usize> Bench<N> {
     }
 }
 
-fn pose_from(bytes: &[u8; 12]) -> Pose {
+pub(crate) fn pose_from(bytes: &[u8; 12]) -> Pose {
     let [x, y, theta] = core::array::from_fn(|k| {
         let word = bytes
             .chunks_exact(4)

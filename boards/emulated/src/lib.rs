@@ -6,6 +6,7 @@
 
 pub mod bench;
 pub mod drivers;
+pub mod fields;
 mod panic;
 pub mod replay;
 pub mod stack;
