@@ -33,7 +33,7 @@ use search::Search;
 /// When to believe what.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalizerConfig {
-    /// Below this quality a scan does not fit (0…1): see [`Quality::value`]. Default 0.45.
+    /// Below this quality a scan does not fit (0…1): see [`Quality::value`]. Default 0.38.
     pub fits: f32,
     /// So many scans in a row that do not fit: lost. Default 3.
     pub patience: u8,
@@ -58,7 +58,7 @@ pub struct LocalizerConfig {
 impl LocalizerConfig {
     /// For lidars that see all around, in rooms.
     pub const DEFAULT: Self = Self {
-        fits: 0.45,
+        fits: 0.38,
         patience: 3,
         accept: 0.55,
         margin: 0.25,

@@ -52,7 +52,8 @@ pub fn squared<const N: usize>(
     out: &mut [u16],
     scratch: &mut Scratch<N>,
 ) -> Result<(), GridError> {
-    let (width, needed) = (usize::from(shape.width()), shape.len());
+    // A shape has a column, but the compiler does not know.
+    let (width, needed) = (usize::from(shape.width()).max(1), shape.len());
     for (needed, passed, fits) in [
         (needed, out.len(), out.len() == needed),
         (needed, cells.len(), cells.len() == needed),
@@ -102,8 +103,11 @@ pub fn roots(squares: &[u16], out: &mut [u8]) {
 
 /// Distances within each column, down and up, then squared.
 fn sweep_columns(out: &mut [u16], width: usize) {
+    let width = width.max(1);
     for start in (width..out.len()).step_by(width) {
-        let (below, here) = out.split_at_mut(start);
+        let Some((below, here)) = out.split_at_mut_checked(start) else {
+            break;
+        };
         pass_on(
             below.rchunks_exact(width).next(),
             here.chunks_exact_mut(width).next(),
@@ -112,7 +116,9 @@ fn sweep_columns(out: &mut [u16], width: usize) {
     let mut end = out.len();
     while end > width {
         end -= width;
-        let (here, above) = out.split_at_mut(end);
+        let Some((here, above)) = out.split_at_mut_checked(end) else {
+            break;
+        };
         pass_on(
             above.chunks_exact(width).next(),
             here.rchunks_exact_mut(width).next(),

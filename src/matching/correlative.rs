@@ -16,6 +16,7 @@ use crate::{
 };
 use pyramid::Pyramid;
 use rotated::Rotated;
+pub use rotated::sum_four;
 
 /// Where to look, and what counts as found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -283,7 +284,7 @@ impl<const N: usize> Correlator<N> {
         let mut bar = least;
         let top = pyramid.top_level();
         let stride = pyramid.stride(top);
-        let blocks = window.side / stride as i16;
+        let blocks = window.side >> (2 * top);
         for heading in window.outwards() {
             if !self
                 .rotated
@@ -310,15 +311,8 @@ impl<const N: usize> Correlator<N> {
                     x += 4;
                 }
             }
-            // Best bound first.
-            self.blocks
-                .sort_unstable_by_key(|b| (core::cmp::Reverse(b.bound), b.y, b.x));
-            let mut next = 0;
-            while let Some(&block) = self.blocks.get(next) {
-                next += 1;
-                if block.bound <= bar {
-                    break;
-                }
+            // Best bound first; few are ever looked into, so that picking each anew beats sorting.
+            while let Some(block) = take_best(&mut self.blocks, bar) {
                 self.split(pyramid, top, block, heading, near, &mut bar, &mut best);
             }
         }
@@ -360,7 +354,7 @@ impl<const N: usize> Correlator<N> {
             let y = block.y + row * stride;
             let sums = self
                 .rotated
-                .row(pyramid, below, block.x / stride, y / stride);
+                .row(pyramid, below, block.x >> (2 * below), y >> (2 * below));
             self.lookups += 4 * self.rotated.len() as u64;
             for ((part, bound), column) in parts.iter_mut().zip(sums).zip(0i16..) {
                 *part = Block {
@@ -370,13 +364,8 @@ impl<const N: usize> Correlator<N> {
                 };
             }
         }
-        if below > 0 {
-            parts.sort_unstable_by_key(|b| (core::cmp::Reverse(b.bound), b.y, b.x));
-        }
-        for part in parts {
-            if part.bound > *bar {
-                self.split(pyramid, below, part, heading, near, bar, best);
-            }
+        while let Some(part) = take_best(&mut parts, *bar) {
+            self.split(pyramid, below, part, heading, near, bar, best);
         }
     }
 
@@ -448,6 +437,20 @@ impl<const N: usize> Default for Correlator<N> {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// The first of the blocks with the highest bound above `bar`; it is not given again.
+fn take_best(blocks: &mut [Block], bar: u32) -> Option<Block> {
+    let mut best: Option<&mut Block> = None;
+    for block in blocks {
+        if block.bound > best.as_ref().map_or(bar, |best| best.bound) {
+            best = Some(block);
+        }
+    }
+    let best = best?;
+    let block = *best;
+    best.bound = 0;
+    Some(block)
 }
 
 /// What lies around a pose already found.

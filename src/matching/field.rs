@@ -84,11 +84,17 @@ pub fn align<F: Field + ?Sized>(
         gate(field, 2.5 * field.scale().sigma),
         gate(field, config.inlier_distance),
     );
+    // The curvature hardly changes once the pose is good to a centimetre: passes over all beams share it.
+    let mut curved: Option<Sums> = None;
     let mut fine_passes = 0;
     let sums = loop {
         let gate = if stride > 1 { gates.0 } else { gates.1 };
-        let sums = Sums::over(field, points, pose, usize::from(stride), gate)
+        let known = curved.as_ref().filter(|_| fine_passes % 3 != 0);
+        let sums = Sums::over(field, points, pose, usize::from(stride), gate, known)
             .ok_or(MatchError::BadGuess)?;
+        if stride == 1 {
+            curved = Some(sums);
+        }
         iterations += 1;
         let needed = sums.needed(config, points.len());
         if sums.inliers < needed {
@@ -138,6 +144,8 @@ struct Sums {
     lever: f32,
     /// Cell that levers count from.
     pivot: (i32, i32),
+    /// Cells that make a turn comparable with a shift; eigenvalues and vectors of the curvature so scaled.
+    axes: (f32, [(f32, [f32; 3]); 3]),
 }
 
 impl Sums {
@@ -148,6 +156,7 @@ impl Sums {
         pose: Pose,
         stride: usize,
         gate: u8,
+        known: Option<&Self>,
     ) -> Option<Self> {
         let placement = Placement::new(field.shape(), pose)?;
         let shape = field.shape();
@@ -186,19 +195,37 @@ impl Sums {
                 ..placement
             },
         };
-        for chunk in points.chunks(16 * stride) {
-            let part = passes.sum(field, chunk, stride);
-            for (total, part) in sums.slope.iter_mut().zip(part.slope) {
-                *total += i64::from(part);
-            }
-            for (total, part) in sums.curvature.iter_mut().zip(part.curvature) {
-                *total += i64::from(part);
-            }
-            sums.bytes += part.bytes;
-            sums.inliers += part.inliers as u16;
-            sums.overlap += part.overlap as u16;
+        for chunk in points.chunks((16 * stride).max(1)) {
+            let part = match known {
+                Some(_) => passes.sum::<F, false>(field, chunk, stride),
+                None => passes.sum::<F, true>(field, chunk, stride),
+            };
+            sums.add(&part);
         }
+        if let Some(known) = known {
+            (sums.curvature, sums.overlap) = (known.curvature, known.overlap);
+        }
+        sums.axes = match known {
+            Some(known) => known.axes,
+            None => {
+                let curvature = sums.curvature();
+                let lever = sums.mean_lever(&curvature);
+                (lever, curvature.theta_scaled(1.0 / lever).eigen())
+            }
+        };
         Some(sums)
+    }
+
+    fn add(&mut self, part: &Part) {
+        for (total, part) in self.slope.iter_mut().zip(part.slope) {
+            *total += i64::from(part);
+        }
+        for (total, part) in self.curvature.iter_mut().zip(part.curvature) {
+            *total += i64::from(part);
+        }
+        self.bytes += part.bytes;
+        self.inliers += part.inliers as u16;
+        self.overlap += part.overlap as u16;
     }
 
     fn needed(&self, config: &FieldConfig, beams: usize) -> u16 {
@@ -230,10 +257,7 @@ impl Sums {
     fn step(&self, config: &FieldConfig) -> Option<[f32; 3]> {
         let [gx, gy, gt] = self.slope.map(|sum| sum as f32 / 64.0);
         let slope = [gx, gy, gt * self.lever];
-        let curvature = self.curvature();
-        let lever = self.mean_lever(&curvature);
-        let scaled = curvature.theta_scaled(1.0 / lever);
-        let pairs = scaled.eigen();
+        let (lever, pairs) = self.axes;
         let strongest = pairs[2].0;
         if !(strongest > 0.0) {
             return None;
@@ -397,19 +421,28 @@ struct Part {
 }
 
 impl Pass {
-    #[inline]
-    fn sum<F: Field + ?Sized>(&self, field: &F, points: &[ScanPoint], stride: usize) -> Part {
+    /// Slopes, and with `CURVED` the curvatures too.
+    #[inline(never)]
+    fn sum<F: Field + ?Sized, const CURVED: bool>(
+        &self,
+        field: &F,
+        points: &[ScanPoint],
+        stride: usize,
+    ) -> Part {
         let mut part = Part::default();
         let [mut gx, mut gy, mut gt] = part.slope;
         let [mut sxx, mut sxy, mut syy, mut sxt, mut syt, mut stt] = part.curvature;
-        for point in points.iter().step_by(stride) {
+        let (mut bytes, mut inliers, mut beside) = (0, 0, 0);
+        for point in points.iter().step_by(stride.max(1)) {
             let (px, py) = self.placement.place(point);
             let (fx, fy) = (px >> self.fine, py >> self.fine);
             let Some(cells) = field.around(fx >> 6, fy >> 6) else {
                 continue;
             };
             if cells.here < self.gate {
-                part.overlap += u32::from(cells.here != self.unexplored);
+                if CURVED {
+                    beside += u32::from(cells.here != self.unexplored);
+                }
                 continue;
             }
             let (dx, dy) = ((fx & 63) as i32, (fy & 63) as i32);
@@ -425,17 +458,19 @@ impl Pass {
             gx += slope_x;
             gy += slope_y;
             gt += slope_y * lx - slope_x * ly;
-            let (xt, yt) = (xy * lx - xx * ly, yy * lx - xy * ly);
-            sxx += xx;
-            sxy += xy;
-            syy += yy;
-            sxt += xt;
-            syt += yt;
-            stt += yt * lx - xt * ly;
-            part.bytes += cells.here as u32;
-            part.inliers += 1;
+            if CURVED {
+                let (xt, yt) = (xy * lx - xx * ly, yy * lx - xy * ly);
+                sxx += xx;
+                sxy += xy;
+                syy += yy;
+                sxt += xt;
+                syt += yt;
+                stt += yt * lx - xt * ly;
+            }
+            bytes += cells.here as u32;
+            inliers += 1;
         }
-        part.overlap += part.inliers;
+        (part.bytes, part.inliers, part.overlap) = (bytes, inliers, inliers + beside);
         part.slope = [gx, gy, gt];
         part.curvature = [sxx, sxy, syy, sxt, syt, stt];
         part

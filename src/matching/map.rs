@@ -44,7 +44,7 @@ pub fn correlate(map: &Grid<&[u8]>, local: &Grid<&[u8]>, map_from_local: Pose) -
         y: 0.0,
         ..grid_from_grid
     };
-    for (row, cells) in local.cells().chunks_exact(width).enumerate() {
+    for (row, cells) in local.cells().chunks_exact(width.max(1)).enumerate() {
         let half = 0.5 * local.shape().resolution();
         let first = turn * Point::new(half, half + row as f32 * local.shape().resolution());
         let place = |metres: f32| {

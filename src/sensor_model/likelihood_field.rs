@@ -258,10 +258,20 @@ pub trait Field {
     /// The byte with its neighbours; `None` at the edge and off the field.
     fn around(&self, x: u32, y: u32) -> Option<Around>;
 
+    /// Sum of the bytes that `points` end in.
+    fn sum(&self, points: &[ScanPoint], placement: &Placement) -> u32 {
+        let mut sum = 0;
+        for point in points {
+            let (x, y) = placement.cell(point);
+            sum += u32::from(self.byte(x, y));
+        }
+        sum
+    }
+
     /// How well `points` fit, seen from `map_from_lidar`; a pose out of reach scores as all unexplored.
     fn score(&self, points: &[ScanPoint], map_from_lidar: Pose) -> Score {
         let sum = match Placement::new(self.shape(), map_from_lidar) {
-            Some(placement) => sum_bytes(self, points, &placement),
+            Some(placement) => self.sum(points, &placement),
             None => points.len() as u32 * u32::from(self.scale().unexplored),
         };
         Score {
@@ -269,20 +279,6 @@ pub trait Field {
             beams: points.len() as u16,
         }
     }
-}
-
-/// Sum of the bytes that `points` end in.
-pub(crate) fn sum_bytes<F: Field + ?Sized>(
-    field: &F,
-    points: &[ScanPoint],
-    placement: &Placement,
-) -> u32 {
-    let mut sum = 0;
-    for point in points {
-        let (x, y) = placement.cell(point);
-        sum += u32::from(field.byte(x, y));
-    }
-    sum
 }
 
 /// A field that is one table.
@@ -389,9 +385,12 @@ impl Field for LikelihoodField<&[u8]> {
         let width = u32::from(self.grid.shape().width());
         // Rows below 2¹⁷ and columns below 2¹⁴ (see `Placement`): the product cannot wrap.
         let index = y.wrapping_mul(width).wrapping_add(x) as usize;
+        if x >= width {
+            return self.scale.unexplored;
+        }
         match self.grid.cells().get(index) {
-            Some(&byte) if x < width => byte,
-            _ => self.scale.unexplored,
+            Some(&byte) => byte,
+            None => self.scale.unexplored,
         }
     }
 
@@ -403,7 +402,11 @@ impl Field for LikelihoodField<&[u8]> {
         }
         let index = (y as usize).wrapping_mul(width).wrapping_add(x as usize);
         let start = index.wrapping_sub(width);
-        let rows = self.grid.cells().get(start..)?;
+        // One check for all six: the rows below, of and above the cell, up to its corner.
+        let rows = self
+            .grid
+            .cells()
+            .get(start..start.wrapping_add(2 * width + 2))?;
         let (&below, &left, &here) = (rows.first()?, rows.get(width - 1)?, rows.get(width)?);
         let (&right, &above, &corner) = (
             rows.get(width + 1)?,

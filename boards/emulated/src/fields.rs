@@ -2,13 +2,14 @@
 //!
 //! `input.bin`, little endian: the field as `beamfix::sensor_model::likelihood_field::stored` has it, padded to
 //! [`FIELD`] bytes; the pose `f32 x, y, theta`; `u32` beams, then for each `u16` bearing (1/65536 turn), `u16` range (mm).
-//! `output.bin`, `u32` each: sum of the score, its instructions; the poses of Newton's method and of the search as three
+//! `output.bin`, `u32` each: sum of the score, its instructions; sum of four places of the search's inner loop, its
+//! instructions; the poses of Newton's method and of the search as three
 //! `f32` each, with the instructions, the passes over the beams or the bytes looked up; at the end the peak stack (bytes).
 
 use beamfix::{
     geometry::Pose,
     matching::{
-        correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid},
+        correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid, sum_four},
         field::{self, FieldConfig},
     },
     scan::{Bearing, ScanPoint},
@@ -45,6 +46,7 @@ pub struct Fields {
     pyramid: [u8; 400],
     points: heapless::Vec<ScanPoint, BEAMS>,
     correlator: Correlator<96>,
+    indices: heapless::Vec<u32, BEAMS>,
 }
 
 impl Fields {
@@ -56,6 +58,7 @@ impl Fields {
             pyramid: [0; 400],
             points: heapless::Vec::new(),
             correlator: Correlator::new(),
+            indices: heapless::Vec::new(),
         }
     }
 
@@ -90,6 +93,13 @@ impl Fields {
             machine.restart();
             let score = field.score(&self.points, pose);
             out(&[score.sum, machine.instructions()])?;
+            self.indices.clear();
+            for point in &self.points {
+                let _ = self.indices.push(u32::from(point.bearing.0) * 3000 >> 16);
+            }
+            machine.restart();
+            let sums = sum_four(field.grid().cells(), &self.indices);
+            out(&[sums.iter().sum(), machine.instructions()])?;
             machine.restart();
             let found = field::align(&field, &self.points, pose, &NEWTON);
             let instructions = machine.instructions();

@@ -5,7 +5,7 @@ use beamfix::{
     geometry::Pose,
     grid::Shape,
     matching::{
-        correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid},
+        correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid, sum_four},
         field::{self, FieldConfig},
     },
     scan::ScanPoint,
@@ -48,6 +48,8 @@ pub struct Costs {
     pub newton: u32,
     /// Passes over the beams.
     pub passes: u32,
+    /// Instructions a byte looked up in the search's inner loop.
+    pub inner_per_lookup: f32,
     /// Instructions a byte looked up by branch and bound, with all that a search takes beside them.
     pub search_per_lookup: f32,
     /// Instructions of the whole search: ±0.7 m, ±12°.
@@ -105,6 +107,8 @@ pub fn measure(board: &Board) -> Result<Costs> {
     let [
         sum,
         score,
+        fours,
+        inner,
         x,
         y,
         theta,
@@ -118,14 +122,14 @@ pub fn measure(board: &Board) -> Result<Costs> {
         stack_bytes,
     ] = words[..]
     else {
-        anyhow::bail!("{}: {} words came back, not 13", board.name, words.len());
+        anyhow::bail!("{}: {} words came back, not 15", board.name, words.len());
     };
     let here = on_host(&scene)?;
     ensure!(
-        [sum, x, y, theta, sx, sy, stheta] == here,
+        [sum, fours, x, y, theta, sx, sy, stheta] == here,
         "{}: {:x?} is not what the host finds: {here:x?}",
         board.name,
-        [sum, x, y, theta, sx, sy, stheta]
+        [sum, fours, x, y, theta, sx, sy, stheta]
     );
     ensure!(
         passes > 0 && lookups > 0,
@@ -139,6 +143,7 @@ pub fn measure(board: &Board) -> Result<Costs> {
         newton_per_beam: newton as f32 / (beams * passes as f32),
         newton,
         passes,
+        inner_per_lookup: inner as f32 / (4.0 * beams),
         search_per_lookup: search as f32 / lookups as f32,
         search,
         lookups,
@@ -146,7 +151,7 @@ pub fn measure(board: &Board) -> Result<Costs> {
     })
 }
 
-fn on_host(scene: &Scene) -> Result<[u32; 7]> {
+fn on_host(scene: &Scene) -> Result<[u32; 8]> {
     let field = scene.field.as_slice();
     let score = field.score(&scene.points, scene.guess);
     let newton = field::align(&field, &scene.points, scene.guess, &NEWTON)
@@ -159,7 +164,13 @@ fn on_host(scene: &Scene) -> Result<[u32; 7]> {
         .context("the search, here")?;
     let [x, y, t] = [newton.pose.x, newton.pose.y, newton.pose.theta].map(f32::to_bits);
     let [sx, sy, st] = [search.pose.x, search.pose.y, search.pose.theta].map(f32::to_bits);
-    Ok([score.sum, x, y, t, sx, sy, st])
+    let indices: Vec<u32> = scene
+        .points
+        .iter()
+        .map(|point| (u32::from(point.bearing.0) * 3000) >> 16)
+        .collect();
+    let fours = sum_four(field.grid().cells(), &indices).iter().sum();
+    Ok([score.sum, fours, x, y, t, sx, sy, st])
 }
 
 fn input(scene: &Scene) -> Vec<u8> {

@@ -52,7 +52,10 @@ impl<'a> Pyramid<'a> {
         if passed < needed {
             return Err(GridError::Storage { needed, passed });
         }
-        let (low, rest) = buffer.split_at_mut(entries(&shape, 4).0 * entries(&shape, 4).1);
+        let (columns, rows) = entries(&shape, 4);
+        let Some((low, rest)) = buffer.split_at_mut_checked(columns * rows) else {
+            return Err(GridError::Storage { needed, passed });
+        };
         fill(&field, 4, low);
         fill(&field, 16, rest);
         let (low, high) = (&*low, &*rest);

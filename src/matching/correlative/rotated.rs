@@ -96,8 +96,8 @@ impl<const N: usize> Rotated<N> {
                 .push((row.wrapping_mul(table.width).wrapping_add(column)) as u32);
             if on {
                 // Keep both lists in the same order.
-                self.indices.swap(k, self.inside);
-                self.cells.swap(k, self.inside);
+                swap(&mut self.indices, k, self.inside);
+                swap(&mut self.cells, k, self.inside);
                 self.inside += 1;
             }
         }
@@ -135,22 +135,17 @@ impl<const N: usize> Rotated<N> {
     }
 }
 
-/// Sums of four bytes in a row from each index on: two additions for four places.
-pub(crate) fn sum_four(table: &[u8], indices: &[u32]) -> [u32; 4] {
+/// Sums of four bytes in a row from each index on: two additions for four places. An index without four bytes after it
+/// counts as nothing.
+#[must_use]
+pub fn sum_four(table: &[u8], indices: &[u32]) -> [u32; 4] {
     let mut sums = [0u32; 4];
+    let Some(last) = table.len().checked_sub(4) else {
+        return sums;
+    };
     // 256 bytes of 255 fit in 16 bits.
     for indices in indices.chunks(256) {
-        let (mut even, mut odd) = (0u32, 0u32);
-        for &index in indices {
-            if let Some(bytes) = table
-                .get(index as usize..)
-                .and_then(|rest| rest.first_chunk::<4>())
-            {
-                let word = u32::from_le_bytes(*bytes);
-                even = even.wrapping_add(word & 0x00ff_00ff);
-                odd = odd.wrapping_add((word >> 8) & 0x00ff_00ff);
-            }
-        }
+        let (even, odd) = sum_pairs(table, last as u32, indices);
         for (sum, part) in sums
             .iter_mut()
             .zip([even & 0xffff, odd & 0xffff, even >> 16, odd >> 16])
@@ -159,6 +154,37 @@ pub(crate) fn sum_four(table: &[u8], indices: &[u32]) -> [u32; 4] {
         }
     }
     sums
+}
+
+/// The loop of [`sum_four`], by itself so that all of it stays in registers: the first and third byte's sums in the
+/// halves of one word, the second's and fourth's in those of another.
+#[inline(never)]
+fn sum_pairs(table: &[u8], last: u32, indices: &[u32]) -> (u32, u32) {
+    let (mut even, mut odd) = (0u32, 0u32);
+    for &index in indices {
+        // Up to `last` both are there: four bytes are one load where it may be unaligned.
+        let bytes = table
+            .get(index as usize..)
+            .and_then(|rest| rest.first_chunk::<4>());
+        if let Some(bytes) = bytes.filter(|_| index <= last) {
+            let word = u32::from_le_bytes(*bytes);
+            even = even.wrapping_add(word & 0x00ff_00ff);
+            odd = odd.wrapping_add((word >> 8) & 0x00ff_00ff);
+        }
+    }
+    (even, odd)
+}
+
+/// Swaps two entries, where there are two.
+fn swap<T: Copy>(list: &mut [T], a: usize, b: usize) {
+    if let (Some(&at_a), Some(&at_b)) = (list.get(a), list.get(b)) {
+        if let Some(entry) = list.get_mut(a) {
+            *entry = at_b;
+        }
+        if let Some(entry) = list.get_mut(b) {
+            *entry = at_a;
+        }
+    }
 }
 
 #[cfg(test)]

@@ -235,7 +235,7 @@ fn draw<C: Canvas + ?Sized>(
     let half = math::round_to_i32(4.0 * piece.half);
     let quarter_mm =
         |cell: i32, middle: f32| math::round_to_i32((cell as f32 + 0.5 - middle) * cell_mm * 4.0);
-    let clip = |cell: i32, side: u16| cell.clamp(0, i32::from(side) - 1);
+    let clip = |cell: i32, side: u16| cell.max(0).min(i32::from(side) - 1);
     let first_x = clip(math::round_to_i32(mx - rx - 0.5), shape.width());
     let last_x = clip(math::round_to_i32(mx + rx - 0.5), shape.width());
     let first_y = clip(math::round_to_i32(my - ry - 0.5), shape.height());
