@@ -99,6 +99,23 @@ impl Sym3 {
         }
     }
 
+    /// The same quadratic form over motions whose turn is about `(x, y)`, given that over motions whose turn is about the
+    /// origin.
+    #[must_use]
+    pub fn turning_about(&self, x: f32, y: f32) -> Self {
+        // A turn about (x, y) is one about the origin and a shift by (y, -x) for each radian.
+        let (xt, yt) = (
+            self.xt + self.xx * y - self.xy * x,
+            self.yt + self.xy * y - self.yy * x,
+        );
+        Self {
+            xt,
+            yt,
+            tt: self.tt + y * (xt + self.xt) - x * (yt + self.yt),
+            ..*self
+        }
+    }
+
     /// `A M A` for a symmetric `A`.
     #[must_use]
     pub fn sandwiched(&self, a: &Self) -> Self {
@@ -374,6 +391,17 @@ mod tests {
         let sandwiched = M.sandwiched(&inverse);
         assert!((sandwiched.xx - inverse.xx).abs() < 1e-6);
         assert!((sandwiched.yt - inverse.yt).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_turn_about_another_point_is_a_turn_and_a_shift() {
+        let (x, y) = (0.7, -0.4);
+        let moved = M.turning_about(x, y);
+        for v in [[0.0, 0.0, 1.0], [0.3, -0.2, 0.5], [1.0, 2.0, -1.0]] {
+            let [a, b, t] = v;
+            let about_origin = M.quadratic([a + t * y, b - t * x, t]);
+            assert!((moved.quadratic(v) - about_origin).abs() < 1e-5, "{v:?}");
+        }
     }
 
     #[test]

@@ -21,10 +21,10 @@ pub struct OdometryConfig {
     pub min_range: f32,
     /// Longest range that is used (m). Default 32.
     pub max_range: f32,
-    /// A new keyframe is made this far from the last one (m). Default 0.3: near enough for most surfaces to be seen by
+    /// A new keyframe is made this far from the last one (m). Default 0.5: near enough for most surfaces to be seen by
     /// both, far enough for errors not to add up often.
     pub keyframe_distance: f32,
-    /// A new keyframe is made this much turned from the last one (rad). Default 0.35.
+    /// A new keyframe is made this much turned from the last one (rad). Default 0.4.
     pub keyframe_turn: f32,
     /// A new keyframe is made when fewer than this share of the beams meet the last one's surfaces. Default 0.6.
     pub keyframe_overlap: f32,
@@ -45,8 +45,8 @@ impl OdometryConfig {
         mount: Mount::DEFAULT,
         min_range: 0.05,
         max_range: 32.0,
-        keyframe_distance: 0.3,
-        keyframe_turn: 0.35,
+        keyframe_distance: 0.5,
+        keyframe_turn: 0.4,
         keyframe_overlap: 0.6,
         max_correction: 0.45,
         prior_error: 0.1,
@@ -199,19 +199,23 @@ impl<const N: usize> Odometry<N> {
     pub fn update(&mut self, scan: &Scan<N>, wheels: Option<Pose>) -> Step {
         let seconds = self.elapsed(scan);
         let motion = self.predicted_motion(wheels, seconds);
-        self.unbend(scan, motion, seconds);
         let predicted = self.pose * motion;
         let predicted_covariance = self.grown(motion);
+        self.see(scan, motion, seconds);
         // Wheels that slip tell a wrong motion; to go on as before may then be the better guess.
-        let outcome = self
-            .matched(predicted)
-            .or_else(|refusal| match self.wheels {
-                Some(_) => self
-                    .matched(self.pose * self.twist.over(seconds))
-                    .map_err(|_| refusal),
-                None => Err(refusal),
-            })
-            .map(|found| self.matched_again(scan, predicted, seconds, found));
+        let mut outcome = self.matched(predicted).or_else(|refusal| {
+            let other = self.pose * self.twist.over(seconds);
+            self.wheels
+                .map_or(Err(refusal), |_| self.matched(other).map_err(|_| refusal))
+        });
+        // A scan is as bent as the motion during it differs from the guess: bend it back by what was found, and look again.
+        if let Ok(found) = &outcome {
+            let found_motion = self.pose.between(self.placed(found).0);
+            if scan.duration() > 0.0 && differs(motion, found_motion) {
+                self.see(scan, found_motion, seconds);
+                outcome = self.matched(self.pose * found_motion);
+            }
+        }
         let before = self.pose;
         match &outcome {
             Ok(found) => {
@@ -243,6 +247,19 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
+    /// Takes the scan's points, as if the robot had moved evenly by `motion` since the last scan.
+    fn see(&mut self, scan: &Scan<N>, motion: Pose, seconds: f32) {
+        let config = PointsConfig {
+            min_range: self.config.min_range,
+            max_range: self.config.max_range,
+            upside_down: self.config.mount.upside_down,
+            ..PointsConfig::DEFAULT
+        };
+        let during = Twist::from_motion(motion, seconds);
+        let twist = self.config.mount.lidar_twist(during);
+        self.points.assign(scan, twist, &config);
+    }
+
     /// Time since the last scan's end (s); 0 for the first scan and for clocks that stand still or jump.
     fn elapsed(&self, scan: &Scan<N>) -> f32 {
         let micros = scan.end_us().wrapping_sub(self.end_us);
@@ -250,40 +267,6 @@ impl<const N: usize> Odometry<N> {
             return 0.0;
         }
         micros as f32 * 1e-6
-    }
-
-    /// Places the scan's points as seen from its end, the robot having moved by `motion` since the last scan's end.
-    fn unbend(&mut self, scan: &Scan<N>, motion: Pose, seconds: f32) {
-        let config = PointsConfig {
-            min_range: self.config.min_range,
-            max_range: self.config.max_range,
-            upside_down: self.config.mount.upside_down,
-        };
-        let twist = Twist::from_motion(motion, seconds);
-        let lidar_twist = self.config.mount.lidar_twist(twist);
-        self.points.assign(scan, lidar_twist, &config);
-    }
-
-    /// Matches once more where the first match says that a wrong motion has bent the scan: a wheel slipped.
-    ///
-    /// Below the threshold the wheels know the motion during a scan better than the match does, whose own error of
-    /// heading would come back. In the simulated flat this takes a third off the final error.
-    fn matched_again(
-        &mut self,
-        scan: &Scan<N>,
-        predicted: Pose,
-        seconds: f32,
-        found: Match,
-    ) -> Match {
-        /// What a slip turns a robot by in one scan, and noise does not (rad).
-        const SLIP: f32 = 0.02;
-        let (pose, _) = self.placed(&found);
-        let slipped = math::abs(predicted.between(pose).theta) > SLIP;
-        if !(slipped && scan.duration() > 0.0 && seconds > 0.0) {
-            return found;
-        }
-        self.unbend(scan, self.pose.between(pose), seconds);
-        self.matched(pose).unwrap_or(found)
     }
 
     /// Motion of the robot since the last scan by its wheels, else by going on as before.
@@ -381,4 +364,10 @@ impl<const N: usize> Odometry<N> {
             }
         }
     }
+}
+
+/// Whether two motions bend a scan differently: by more than 1 cm or 0.3°.
+fn differs(a: Pose, b: Pose) -> bool {
+    let off = a.between(b);
+    off.distance() > 0.01 || math::abs(off.theta) > 0.005
 }

@@ -95,6 +95,16 @@ impl<const N: usize> Scan<N> {
         })
     }
 
+    /// The beams as they are kept.
+    fn stored(&self) -> &[Stored] {
+        &self.beams
+    }
+
+    /// Age of the last beam (16 µs).
+    fn last_age(&self) -> u16 {
+        self.beams.last().map_or(0, |beam| beam.age)
+    }
+
     /// Time of the first beam (µs, the sensor's or the driver's clock, wrapping).
     #[must_use]
     pub fn start_us(&self) -> u32 {

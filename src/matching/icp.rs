@@ -54,7 +54,7 @@ pub struct IcpConfig {
     /// Worst score that is accepted, from 0 (nothing agrees) to 1. Default 0.25: on recorded pairs no right
     /// pose had less than 0.3.
     pub min_score: f32,
-    /// Standard deviation of a range (m): the least noise that the covariance assumes. Default 0.01.
+    /// Standard deviation of a range (m): the least noise that the covariance assumes. Default 0.005.
     pub range_sigma: f32,
 }
 
@@ -65,7 +65,7 @@ impl IcpConfig {
         coarse_beams: 45,
         min_inliers: 30,
         min_score: 0.25,
-        range_sigma: 0.01,
+        range_sigma: 0.005,
     };
 }
 
@@ -75,18 +75,19 @@ impl Default for IcpConfig {
     }
 }
 
-/// Gate of the first coarse pass (see [`Pass::gate`]) and the one that ends them, and most of them.
+/// Gate of the first coarse pass (see [`Pass::gate`]), and most of them.
 const COARSE_FIRST: u8 = 9;
-const COARSE_LAST: u8 = 5;
-const COARSE_MOST: usize = 16;
+const COARSE_MOST: u8 = 16;
 /// A step that is this short compared with the gate narrows it by two, or by one.
 const SHORT: f32 = 1.0 / 16.0;
 const MEDIUM: f32 = 1.0 / 4.0;
-/// Gate and most of the passes over all points.
+/// Gate of the fine passes, into how many parts they divide the points, points of a part in a row, and most passes.
 const FINE: u8 = 5;
-const FINE_MOST: u8 = 8;
-/// A step this short (m) ends the match.
-const CONVERGED: f32 = 0.003;
+const PARTS: u16 = 2;
+const PART: u16 = 8;
+const FINE_MOST: u8 = 16;
+/// A step this short (m) leaves the points on their lines.
+const STILL: f32 = 0.014;
 
 /// Pose of the lidar that saw `points` in the frame of the one that saw `reference`.
 ///
@@ -128,6 +129,7 @@ pub fn align_observed<const N: usize>(
         lines: reference.lines(),
         points,
         start,
+        lever_shift: pass::lever_shift(points, start),
         config,
     };
     let best = hypotheses::search(&task, &mut observe)?;
@@ -138,14 +140,8 @@ pub fn align_observed<const N: usize>(
 struct Stepped {
     at: FixedPose,
     sums: Sums,
-    /// Length of the step (m): see [`step_length`].
+    /// Length of the step (m): see [`pass::length`].
     length: f32,
-}
-
-/// Length of a step (m), a turn counted at 3 m.
-fn step_length(step: [f32; 3]) -> f32 {
-    let [x, y, t] = step.map(crate::math::abs);
-    x + y + 3.0 * t
 }
 
 /// What stays the same over one match.
@@ -153,36 +149,33 @@ struct Task<'a> {
     lines: &'a [Line],
     points: &'a [ScanPoint],
     start: FixedPose,
+    lever_shift: u32,
     config: &'a IcpConfig,
 }
 
 impl Task<'_> {
-    /// Every how many-th point a coarse pass takes.
-    fn coarse_stride(&self) -> u8 {
-        let stride = self.points.len() / usize::from(self.config.coarse_beams.max(1));
-        stride.clamp(1, 255) as u8
-    }
-
-    /// One pass and its Gauss–Newton step; `k` chooses another set of points each time.
-    fn step(&self, at: FixedPose, pass: Pass, k: usize) -> Result<Stepped, MatchError> {
-        let needed = self.config.min_inliers / u16::from(pass.stride.max(1)) / 2;
-        let sums = pass::run(
-            self.lines,
-            self.points,
-            at,
-            pass,
-            k % usize::from(pass.stride.max(1)),
-        );
+    /// A pass, what earlier ones knew, and the Gauss–Newton step of both.
+    fn step(
+        &self,
+        at: FixedPose,
+        pass: Pass,
+        earlier: Option<&Sums>,
+    ) -> Result<Stepped, MatchError> {
+        let mut sums = pass::run(self.lines, self.points, at, self.lever_shift, pass);
+        // Half of the share of the points that the pass looked at.
+        let needed = self.config.min_inliers * pass.length / pass.period.max(1) / 2;
         if sums.inliers < needed {
             let found = sums.inliers;
             return Err(MatchError::TooFewCorrespondences { found, needed });
         }
-        let (h, b) = sums.equations();
-        let step = h.solve(b).ok_or(MatchError::Degenerate)?;
+        if let Some(earlier) = earlier {
+            sums.remember(earlier);
+        }
+        let step = sums.step(self.lever_shift).ok_or(MatchError::Degenerate)?;
         Ok(Stepped {
-            at: at.moved(step),
+            at: at.moved(step, self.start),
             sums,
-            length: step_length(step),
+            length: pass::length(step),
         })
     }
 
@@ -192,56 +185,77 @@ impl Task<'_> {
         start: FixedPose,
         observe: &mut impl FnMut(Pose),
     ) -> Result<Candidate, MatchError> {
-        let stride = self.coarse_stride();
+        let beams = self.config.coarse_beams.max(1);
+        let period = (self.points.len() as u16).div_ceil(beams).max(1);
         let mut at = start;
         let mut gate = COARSE_FIRST;
         let mut passes = 0;
-        for k in 0..COARSE_MOST {
-            passes += 1;
-            let stepped = self.step(at, Pass { stride, gate }, k)?;
+        while gate > FINE && passes < COARSE_MOST {
+            let pass = Pass {
+                period,
+                // Another set of points each time.
+                first: u16::from(passes) % period,
+                length: 1,
+                gate,
+            };
+            let stepped = self.step(at, pass, None)?;
             at = stepped.at;
             observe(at.pose());
+            passes += 1;
             let width = f32::from(4u16 << gate) * 1e-3;
             if stepped.length < width * SHORT {
                 gate -= 2;
             } else if stepped.length < width * MEDIUM {
                 gate -= 1;
             }
-            if gate <= COARSE_LAST {
-                break;
-            }
         }
         Ok(self.judged(at, passes))
     }
 
-    /// Passes over all points until they move the pose no more; and how many.
+    /// From a candidate to the pose: passes over a part of the points each, which share what they know, until all
+    /// parts have been taken in without a long step.
     fn fine(
         &self,
         start: FixedPose,
         observe: &mut impl FnMut(Pose),
     ) -> Result<(Stepped, u8), MatchError> {
-        let pass = Pass {
-            stride: 1,
-            gate: FINE,
-        };
-        let mut state = self.step(start, pass, 0)?;
-        observe(state.at.pose());
-        let mut passes = 1;
-        while passes < 2 || (passes < FINE_MOST && state.length >= CONVERGED) {
-            state = self.step(state.at, pass, 0)?;
-            observe(state.at.pose());
+        let mut state: Option<Stepped> = None;
+        let mut at = start;
+        let (mut part, mut passes) = (0, 0);
+        loop {
+            let pass = Pass {
+                period: PART * PARTS,
+                first: PART * (part % PARTS),
+                length: PART,
+                gate: FINE,
+            };
+            let earlier = state.as_ref().map(|state| &state.sums);
+            let stepped = self.step(at, pass, earlier)?;
+            at = stepped.at;
+            observe(at.pose());
             passes += 1;
+            part += 1;
+            if part >= PARTS || passes >= FINE_MOST {
+                return Ok((stepped, passes));
+            }
+            // After a long step other lines are met: what was known before is worth nothing.
+            state = (stepped.length < STILL).then_some(stepped);
+            if state.is_none() {
+                part = 0;
+            }
         }
-        Ok((state, passes))
     }
 
     fn judged(&self, at: FixedPose, passes: u8) -> Candidate {
-        let stride = usize::from(self.coarse_stride()).div_ceil(2);
+        let stride = (self.points.len() as u16)
+            .div_ceil(self.config.coarse_beams.max(1))
+            .max(1);
         let score = score::judge(self.lines, self.points, at, stride);
         Candidate {
             at,
             passes,
-            value: score.value((20 / stride) as u16),
+            overlap: score.overlap.saturating_mul(stride),
+            value: score.value(20 / stride),
         }
     }
 }

@@ -109,6 +109,18 @@ impl Range {
         }
     }
 
+    /// Millimetres if they are at least `least`, which is not 0, and at most `span` more, which is at most
+    /// [`Range::MAX_MM`].
+    #[must_use]
+    pub(super) const fn within(self, least: u16, span: u16) -> Option<u16> {
+        // Reasons are above every range, and nothing is 0.
+        if self.0.wrapping_sub(least) <= span {
+            Some(self.0)
+        } else {
+            None
+        }
+    }
+
     /// Metres, or why there are none.
     pub fn metres(self) -> Result<f32, NoReturn> {
         self.mm().map(|mm| f32::from(mm) * 1e-3)

@@ -3,7 +3,7 @@
 use crate::{
     geometry::Twist,
     math,
-    scan::{Bearing, Scan},
+    scan::{Bearing, Scan, Stored},
 };
 
 /// A place hit by a beam: 8 bytes, all integers.
@@ -28,6 +28,9 @@ pub struct PointsConfig {
     pub max_range: f32,
     /// The lidar hangs head down: bearings run the other way round. Default false.
     pub upside_down: bool,
+    /// Scans of more beams are thinned to about so many points by averaging neighbours on one surface: nothing of what
+    /// they know is lost, and everything after costs as much less. Default 240; `u16::MAX` leaves every scan as it is.
+    pub enough: u16,
 }
 
 impl PointsConfig {
@@ -36,6 +39,7 @@ impl PointsConfig {
         min_range: 0.05,
         max_range: 32.0,
         upside_down: false,
+        enough: 240,
     };
 }
 
@@ -74,54 +78,100 @@ impl<const N: usize> Points<N> {
     /// Places hit by `scan`, as seen by the lidar at the scan's last beam if it moves with `twist` (its own, not
     /// the robot's).
     ///
-    /// About 25 instructions a beam standing still, 90 in motion on an M4F. Beams without a return or outside
+    /// About 40 instructions a beam standing still, 80 in motion on an M4F. Beams without a return or outside
     /// the configured ranges are left out.
     pub fn assign(&mut self, scan: &Scan<N>, twist: Twist, config: &PointsConfig) {
         self.points.clear();
-        let limits = (millimetres(config.min_range), millimetres(config.max_range));
-        let deskew = Deskew::new(twist, scan.duration());
-        for beam in scan.beams() {
-            let Ok(range) = beam.range.mm() else { continue };
-            if range < limits.0 || range > limits.1 {
+        let least = millimetres(config.min_range).max(1);
+        let sweep = Sweep {
+            least,
+            span: millimetres(config.max_range).saturating_sub(least),
+            flip: if config.upside_down { 0xffff } else { 0 },
+            last: scan.last_age(),
+            deskew: Deskew::new(twist, scan.duration()),
+        };
+        let most = scan.len().div_ceil(usize::from(config.enough.max(1)));
+        for beams in scan.stored().chunks(most.clamp(1, MERGE_MOST)) {
+            if let Some(mean) = sweep.mean(beams) {
+                sweep.place(mean, &mut self.points);
                 continue;
             }
-            let bearing = if config.upside_down {
-                Bearing(beam.bearing.0.wrapping_neg())
-            } else {
-                beam.bearing
-            };
-            let mut point = ScanPoint::at(bearing, range);
-            if let Some(deskew) = &deskew {
-                let Some(moved) = deskew.apply(point, scan.end_us().wrapping_sub(beam.time_us))
-                else {
-                    continue;
-                };
-                point = moved;
+            for beam in beams {
+                if let Some(mean) = sweep.mean(core::slice::from_ref(beam)) {
+                    sweep.place(mean, &mut self.points);
+                }
             }
-            // As many points as beams at most: it fits.
-            let _ = self.points.push(point);
         }
     }
+}
 
-    /// Takes ranges that were all measured at one moment: `bearing` of the first, `step` between two.
-    ///
-    /// For logs of sensors that give a whole scan; ranges beyond N are left out.
-    pub fn assign_ranges(
-        &mut self,
-        ranges: impl Iterator<Item = super::Range>,
-        first: f32,
-        step: f32,
-        config: &PointsConfig,
-    ) {
-        self.points.clear();
-        let limits = (millimetres(config.min_range), millimetres(config.max_range));
-        for (k, range) in ranges.take(N).enumerate() {
-            let Ok(range) = range.mm() else { continue };
-            if range < limits.0 || range > limits.1 {
-                continue;
+/// Neighbours are averaged if their ranges differ by less than this (mm) and twice their distance across the beams:
+/// not over an edge, and not where a wall is grazed and the mean of two ranges would lie off it.
+const MERGE_MM: u32 = 20;
+/// Most beams in a point.
+const MERGE_MOST: usize = 4;
+
+/// What turns the beams of one scan into points.
+struct Sweep {
+    /// Shortest range, and how much longer the longest is (mm).
+    least: u16,
+    span: u16,
+    /// All bits set where bearings run the other way round.
+    flip: u16,
+    /// Age of the scan's last beam (16 µs).
+    last: u16,
+    deskew: Option<Deskew>,
+}
+
+impl Sweep {
+    /// Bearing, range and age of the mean of neighbouring beams; `None` unless all have a range and lie on one surface.
+    fn mean(&self, beams: &[Stored]) -> Option<(u16, u16, u16)> {
+        /// 1/n in Q14.
+        const SHARE: [u32; MERGE_MOST + 1] = [0, 16384, 8192, 5461, 4096];
+        let (first, last) = (beams.first()?, beams.last()?);
+        let mut before = first.range.within(self.least, self.span)?;
+        let mut sum = 0;
+        let mut most = 0;
+        for beam in beams {
+            let range = beam.range.within(self.least, self.span)?;
+            most = most.max(before.abs_diff(range));
+            sum += u32::from(range);
+            before = range;
+        }
+        let turn = last.bearing.0.wrapping_sub(first.bearing.0) as i16;
+        let (steep, wide) = (u32::from(most) > MERGE_MM, u32::from(turn.unsigned_abs()));
+        if steep || wide > 2000 {
+            // 2π/65536 is 25.13/2¹⁸, and the beams are that much apart in all.
+            let across = (u32::from(before) * wide.min(2000) * 25) >> 18;
+            let steps = beams.len() as u32 - 1;
+            if wide > 2000 || (u32::from(most) - MERGE_MM.min(u32::from(most))) * steps > 2 * across
+            {
+                return None;
             }
-            let bearing = Bearing::from_radians(first + step * k as f32);
-            let _ = self.points.push(ScanPoint::at(bearing, range));
+        }
+        let share = SHARE.get(beams.len()).copied().unwrap_or(0);
+        Some((
+            first.bearing.0.wrapping_add((turn >> 1) as u16),
+            ((sum * share + (1 << 13)) >> 14) as u16,
+            first.age.midpoint(last.age),
+        ))
+    }
+
+    fn place<const N: usize>(
+        &self,
+        (bearing, range, age): (u16, u16, u16),
+        points: &mut heapless::Vec<ScanPoint, N>,
+    ) {
+        // In two's complement the negative is all bits flipped, and one more.
+        let bearing = (bearing ^ self.flip).wrapping_add(self.flip & 1);
+        let point = ScanPoint::at(Bearing(bearing), range);
+        let moved = match &self.deskew {
+            Some(deskew) => deskew.apply(point, u32::from(self.last.saturating_sub(age)) << 4),
+            None => Some(point),
+        };
+        if let Some(point) = moved {
+            // As many points as beams at most: it fits.
+            let _ = points.push(point);
         }
     }
 }

@@ -15,6 +15,8 @@ pub(super) struct Candidate {
     pub at: FixedPose,
     /// Passes that led there.
     pub passes: u8,
+    /// Points that met a line, by those that were judged.
+    pub overlap: u16,
     /// See [`super::score::Score::value`].
     pub value: f32,
 }
@@ -24,6 +26,8 @@ pub(super) struct Best {
     pub candidate: Candidate,
     /// The last pass.
     pub last: Stepped,
+    /// Passes of all starts.
+    pub iterations: u8,
     /// Starts tried.
     pub starts: u8,
     /// Worth of the best candidate elsewhere over that of the best.
@@ -137,10 +141,10 @@ pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<
         return Err(MatchError::Ambiguous { ratio });
     }
     let (last, passes) = task.fine(best.at, observe)?;
-    let iterations = race.passes.saturating_add(passes);
     Ok(Best {
-        candidate: task.judged(last.at, iterations),
+        candidate: best,
         last,
+        iterations: race.passes.saturating_add(passes),
         starts: race.starts,
         ratio,
     })

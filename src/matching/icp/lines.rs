@@ -16,7 +16,7 @@ use crate::{
 /// to a few per cent.
 const HALF_WINDOW_MM: u32 = 150;
 /// Most and fewest points on each side.
-const MOST: usize = 8;
+const MOST: usize = 6;
 const FEWEST: usize = 2;
 /// Points farther than this from their chord end it (mm): twice the noise of a cheap lidar.
 const FLAT_MM: i32 = 22;
@@ -29,9 +29,8 @@ const GAP_SLOPE: u32 = 8;
 /// Widest angle between two neighbours (1/65536 turn): 5.5°.
 const GAP_TURN: u32 = 1000;
 
-/// 1/K and 1/(2K + 1) in Q15.
-const PER_SIDE: [i32; MOST + 1] = [0, 32768, 16384, 10923, 8192, 6554, 5461, 4681, 4096];
-const PER_WINDOW: [i32; MOST + 1] = [32768, 10923, 6554, 4681, 3641, 2979, 2521, 2185, 1928];
+/// Neighbours this many lines apart share those between.
+const WIDEST_FILL: usize = 4;
 
 /// Weight of a line by the cosine of the angle at which the beam hits it, in 32 steps: Q10.
 ///
@@ -56,16 +55,17 @@ const fn weights() -> [u16; 34] {
 pub(super) fn lay(lines: &mut [Line], points: &[ScanPoint]) -> u16 {
     lines.fill(Line::NONE);
     let grid = Grid::new(lines.len());
-    let mut count = 0;
     let mut rest = points;
     while let Some((run, others)) = rest.split_at_checked(run_length(rest)) {
         if run.is_empty() {
             break;
         }
-        count += lay_run(lines, run, grid);
+        if lay_flat(lines, run, grid) {
+            lay_others(lines, run, grid);
+        }
         rest = others;
     }
-    count
+    points.len() as u16
 }
 
 /// Number of points from the first on that lie on one surface.
@@ -73,17 +73,14 @@ fn run_length(points: &[ScanPoint]) -> usize {
     let breaks = points.windows(2).position(|pair| {
         let [a, b] = pair else { return true };
         let turn = u32::from((b.bearing.0.wrapping_sub(a.bearing.0) as i16).unsigned_abs());
-        if turn > GAP_TURN {
-            return true;
+        let step = u32::from(a.range.abs_diff(b.range));
+        // Most neighbours pass here.
+        if turn <= GAP_TURN && step <= GAP_MM {
+            return false;
         }
-        let (near, far) = if a.range < b.range {
-            (a.range, b.range)
-        } else {
-            (b.range, a.range)
-        };
         // 2π/65536 is 25.13/2¹⁸.
-        let across = (u32::from(near) * turn * 25) >> 18;
-        u32::from(far - near) > GAP_MM + GAP_SLOPE * across
+        let across = (u32::from(a.range.min(b.range)) * turn * 25) >> 18;
+        turn > GAP_TURN || step > GAP_MM + GAP_SLOPE * across
     });
     breaks.map_or(points.len(), |at| at + 1)
 }
@@ -92,8 +89,35 @@ fn run_length(points: &[ScanPoint]) -> usize {
 #[derive(Clone, Copy)]
 struct Grid {
     bins: u32,
+    /// Half a line's width, so that a bearing falls to the nearest line.
+    half: u16,
     /// Lines per radian, Q6.
     per_radian: u32,
+}
+
+/// Points of a run that one half of a window has at a metre's distance, Q6: see [`Density::half_window`].
+#[derive(Clone, Copy)]
+struct Density(u32);
+
+impl Density {
+    /// By the angle between the first and the last point of a run.
+    fn new(run: &[ScanPoint]) -> Self {
+        let (Some(first), Some(last)) = (run.first(), run.last()) else {
+            return Self(0);
+        };
+        // A run of more than half a turn is so dense that the bound below holds anyway.
+        let span = u32::from((last.bearing.0.wrapping_sub(first.bearing.0) as i16).unsigned_abs());
+        // Points per radian, Q6: 65536/2π in Q6 is 667 544.
+        // A thousand points per radian are more than any window wants.
+        Self(((run.len() as u32).saturating_mul(667_544) / span.max(64)).min(1 << 16))
+    }
+
+    /// Points on each side that make up half a window, for a point at `1/inverse`.
+    fn half_window(self, inverse: u32) -> usize {
+        // window · points per radian / range: mm · Q6 · Q18.
+        let half = ((inverse >> 6) * ((self.0 * HALF_WINDOW_MM) >> 6)) >> 18;
+        (half as usize).clamp(FEWEST, MOST)
+    }
 }
 
 impl Grid {
@@ -102,14 +126,13 @@ impl Grid {
         // 1/2π in Q16 is 10 430.
         Self {
             bins,
+            half: (32_768 / bins.max(1)) as u16,
             per_radian: (bins * 10_430) >> 10,
         }
     }
 
     fn bin(self, point: &ScanPoint) -> usize {
-        // Half a line's width on, so that a bearing falls to the nearest line.
-        let half = 32_768 / self.bins;
-        ((u32::from(point.bearing.0.wrapping_add(half as u16)) * self.bins) >> 16) as usize
+        ((u32::from(point.bearing.0.wrapping_add(self.half)) * self.bins) >> 16) as usize
     }
 }
 
@@ -122,88 +145,86 @@ struct Laid {
     offset: i32,
 }
 
-/// Lays the lines of one run.
-fn lay_run(lines: &mut [Line], run: &[ScanPoint], grid: Grid) -> u16 {
+/// Lays lines where a run is straight; empties the places of its other points, and tells whether there are any.
+fn lay_flat(lines: &mut [Line], run: &[ScanPoint], grid: Grid) -> bool {
+    let mut bent = false;
     let mut before = None;
+    let last = run.len().saturating_sub(1);
+    let density = Density::new(run);
     for (i, point) in run.iter().enumerate() {
-        let half = half_window(point, grid);
-        // A run's ends have fewer points on one side: take as many on the other.
-        let half = half.min(i).min(run.len() - 1 - i);
-        let laid = if half >= FEWEST {
-            centred(run, i, half)
-        } else {
-            None
-        };
         let bin = grid.bin(point);
-        let line = laid.map_or(Line::NONE, |laid| store(point, &laid, grid, false));
-        if let Some(slot) = lines.get_mut(bin) {
-            *slot = line;
+        // One line for the points of a direction.
+        if before == Some(bin) {
+            continue;
         }
-        fill_between(lines, before, bin, line);
-        before = Some(bin);
-    }
-    let mut count = 0;
-    for (i, point) in run.iter().enumerate() {
-        let bin = grid.bin(point);
-        if lines.get(bin).is_some_and(|line| !line.is_some()) {
-            let half = half_window(point, grid);
-            let borrowed = [
-                i + half,
-                i.wrapping_sub(half),
-                i + FEWEST,
-                i.wrapping_sub(FEWEST),
-            ]
-            .into_iter()
-            .find_map(|from| borrow(lines.get(grid.bin(run.get(from)?))?, point));
-            let line = match borrowed {
-                Some(laid) => store(point, &laid, grid, false),
-                None => {
-                    let laid = [i.wrapping_sub(1), i, i.wrapping_sub(2)]
-                        .into_iter()
-                        .find_map(|from| three(run, from, point));
-                    store(point, &laid.unwrap_or(facing(point)), grid, true)
-                }
-            };
-            if let Some(slot) = lines.get_mut(bin) {
-                *slot = line;
+        let inverse = reciprocal(u32::from(point.range));
+        // A run's ends have fewer points on one side: take as many on the other.
+        let half = density.half_window(inverse).min(i).min(last - i);
+        let Some(slot) = lines.get_mut(bin) else {
+            continue;
+        };
+        match centred(run, i, half) {
+            Some(laid) => store(slot, point, &laid, inverse, grid, false),
+            None => {
+                *slot = Line::NONE;
+                bent = true;
             }
         }
-        count += 1;
+        fill_between(lines, before, bin);
+        before = Some(bin);
     }
-    count
+    bent
 }
 
-/// Points on each side of `point` that make up half a window.
-fn half_window(point: &ScanPoint, grid: Grid) -> usize {
-    // window / (range · angle between two lines): Q24 · Q6 · mm.
-    let half = ((reciprocal(u32::from(point.range)) >> 6)
-        * ((grid.per_radian * HALF_WINDOW_MM) >> 6))
-        >> 18;
-    (half as usize).clamp(FEWEST, MOST)
+/// Lays lines through the points of a run that have none yet.
+fn lay_others(lines: &mut [Line], run: &[ScanPoint], grid: Grid) {
+    let density = Density::new(run);
+    for (i, point) in run.iter().enumerate() {
+        let bin = grid.bin(point);
+        if lines.get(bin).is_none_or(Line::is_some) {
+            continue;
+        }
+        let inverse = reciprocal(u32::from(point.range));
+        let half = density.half_window(inverse);
+        let borrowed = [
+            i + half,
+            i.wrapping_sub(half),
+            i + FEWEST,
+            i.wrapping_sub(FEWEST),
+        ]
+        .into_iter()
+        .find_map(|from| borrow(lines.get(grid.bin(run.get(from)?))?, point));
+        let Some(slot) = lines.get_mut(bin) else {
+            continue;
+        };
+        if let Some(laid) = borrowed {
+            store(slot, point, &laid, inverse, grid, false);
+            continue;
+        }
+        let laid = [i.wrapping_sub(1), i, i.wrapping_sub(2)]
+            .into_iter()
+            .find_map(|from| three(run, from, point))
+            .unwrap_or_else(|| facing(point, inverse));
+        store(slot, point, &laid, inverse, grid, true);
+    }
 }
 
-/// Line through the means of the `half` points before and after the `i`-th; `None` where the points leave it.
+/// Line along the chord between the `half`-th points before and after the `i`-th; `None` where the `i`-th or those half
+/// way leave it.
 fn centred(run: &[ScanPoint], i: usize, half: usize) -> Option<Laid> {
-    let point = run.get(i)?;
-    let (first, last) = (run.get(i - half)?, run.get(i + half)?);
-    let (ax, ay) = sum(run.get(i + 1..=i + half)?);
-    let (bx, by) = sum(run.get(i - half..i)?);
-    let per_side = *PER_SIDE.get(half)?;
-    let (dx, dy) = (((ax - bx) * per_side) >> 15, ((ay - by) * per_side) >> 15);
-    let (nx, ny) = normal(dx, dy)?;
-    let per_window = *PER_WINDOW.get(half)?;
+    if half < FEWEST {
+        return None;
+    }
+    let (point, first, last) = (run.get(i)?, run.get(i - half)?, run.get(i + half)?);
     let (px, py) = (i32::from(point.x), i32::from(point.y));
-    // Relative to the point, so that the products stay small.
-    let n = 2 * half as i32;
-    let (mx, my) = (
-        ((ax + bx - n * px) * per_window + (1 << 14)) >> 15,
-        ((ay + by - n * py) * per_window + (1 << 14)) >> 15,
-    );
-    let offset = nx * mx + ny * my;
+    let (fx, fy) = (i32::from(first.x), i32::from(first.y));
+    let (nx, ny) = normal(i32::from(last.x) - fx, i32::from(last.y) - fy)?;
+    // The mean of the three: the ends lie on the chord, the point does not.
+    let offset = (((nx * (fx - px) + ny * (fy - py)) >> 2) * 43) >> 4;
+    let (before, after) = (run.get(i - half / 2)?, run.get(i + half / 2)?);
     let off = |p: &ScanPoint| nx * (i32::from(p.x) - px) + ny * (i32::from(p.y) - py) - offset;
-    let limit = FLAT_MM << 10;
-    let flat = offset.abs() < limit && off(first).abs() < limit && off(last).abs() < limit;
-    flat.then_some(Laid {
+    let flat = |v: i32| v.abs() < FLAT_MM << 10;
+    (flat(offset) && flat(off(before)) && flat(off(after))).then_some(Laid {
         nx,
         ny,
         offset: (offset + 32) >> 6,
@@ -241,22 +262,19 @@ fn three(run: &[ScanPoint], from: usize, point: &ScanPoint) -> Option<Laid> {
         nx * (i32::from(p.x) - i32::from(point.x)) + ny * (i32::from(p.y) - i32::from(point.y))
     };
     let (a, b, c) = (off(first), off(middle), off(last));
-    let sum = a + b + c;
-    // One of the three is the point itself: on a straight line the sum is a few centimetres.
-    ((b - a).abs() < BENT_MM << 10 && sum.abs() < 1 << 22).then(|| Laid {
+    ((b - a).abs() < BENT_MM << 10).then_some(Laid {
         nx,
         ny,
         // A third of the sum, in 1/16 mm.
-        offset: (sum * 341 + (1 << 15)) >> 16,
+        offset: (((a >> 6) + (b >> 6) + (c >> 6)) * 341 + (1 << 9)) >> 10,
     })
 }
 
 /// A surface that faces the lidar: all that can be said of a point on its own.
-fn facing(point: &ScanPoint) -> Laid {
-    let inverse = reciprocal(u32::from(point.range)) as i32;
+fn facing(point: &ScanPoint, inverse: u32) -> Laid {
     Laid {
-        nx: (i32::from(point.x) * inverse) >> 14,
-        ny: (i32::from(point.y) * inverse) >> 14,
+        nx: i32::from(point.x).wrapping_mul(inverse as i32) >> 14,
+        ny: i32::from(point.y).wrapping_mul(inverse as i32) >> 14,
         offset: 0,
     }
 }
@@ -265,64 +283,63 @@ fn facing(point: &ScanPoint) -> Laid {
 fn normal(dx: i32, dy: i32) -> Option<(i32, i32)> {
     let (mut dx, mut dy) = (dx, dy);
     let mut length = rough_length(dx, dy);
-    if length < 5 {
-        return None;
-    }
     // The reciprocal wants 128 to 32 767.
-    while length < 256 {
-        (dx, dy, length) = (dx << 2, dy << 2, length << 2);
+    if length < 128 {
+        if length < 5 {
+            return None;
+        }
+        (dx, dy, length) = (dx << 5, dy << 5, length << 5);
     }
     while length > 32_767 {
-        (dx, dy, length) = (dx >> 1, dy >> 1, length >> 1);
+        (dx, dy, length) = (dx >> 2, dy >> 2, length >> 2);
     }
     let inverse = reciprocal(length) as i32;
     Some(((-dy * inverse) >> 14, (dx * inverse) >> 14))
 }
 
-fn sum(points: &[ScanPoint]) -> (i32, i32) {
-    points
-        .iter()
-        .fold((0, 0), |(x, y), p| (x + i32::from(p.x), y + i32::from(p.y)))
-}
-
 /// Weights the normal and finds what leads to the line's place among the others.
-fn store(point: &ScanPoint, laid: &Laid, grid: Grid, doubtful: bool) -> Line {
+fn store(
+    slot: &mut Line,
+    point: &ScanPoint,
+    laid: &Laid,
+    inverse: u32,
+    grid: Grid,
+    doubtful: bool,
+) {
     let (px, py) = (i32::from(point.x), i32::from(point.y));
-    let inverse = reciprocal(u32::from(point.range));
+    // A point whose range is not its distance, which no scan has, gives a wrong line: hence the wrapping.
     // |cos β| = |n · p| / |p|: Q10.
-    let cos = (((laid.nx * px + laid.ny * py).unsigned_abs() >> 8) * inverse) >> 16;
+    let cos = ((laid.nx * px + laid.ny * py).unsigned_abs() >> 8).wrapping_mul(inverse) >> 16;
     let mut weight = i32::from(WEIGHT.get((cos >> 5) as usize).copied().unwrap_or(1000));
     if doubtful {
         weight = (weight * 3) >> 2;
     }
-    // Lines per radian over the distance: Q16 a millimetre.
-    let pull = ((inverse >> 4) * grid.per_radian) >> 10;
-    let towards = |p: i32| {
-        let unit = (p * inverse as i32) >> 9;
-        let u = (unit * (if pull > 16_383 { 16_383 } else { pull as i32 })) >> 15;
-        u as i16
-    };
-    Line {
+    // Direction, and lines per radian over the distance: Q15 and Q16 a millimetre.
+    let pull = ((((inverse >> 4) * grid.per_radian) >> 10).min(16_383)) as i32;
+    let towards = |p: i32| ((p.wrapping_mul(inverse as i32) >> 9).wrapping_mul(pull) >> 15) as i16;
+    *slot = Line {
         qx: (px + ((laid.nx * laid.offset + (1 << 13)) >> 14)) as i16,
         qy: (py + ((laid.ny * laid.offset + (1 << 13)) >> 14)) as i16,
         mx: ((laid.nx * weight + 512) >> 10) as i16,
         my: ((laid.ny * weight + 512) >> 10) as i16,
         ux: towards(px),
         uy: towards(py),
-    }
+    };
 }
 
-/// Gives a line that stayed empty between two neighbours on one surface to the later one.
-fn fill_between(lines: &mut [Line], before: Option<usize>, bin: usize, line: Line) {
+/// Gives the lines between two neighbours on one surface, where there are more lines than points, to the later one.
+fn fill_between(lines: &mut [Line], before: Option<usize>, bin: usize) {
     let Some(before) = before else { return };
-    let between = if bin == before + 2 {
-        before + 1
-    } else if before == bin + 2 {
-        bin + 1
+    let (low, high) = if before < bin {
+        (before, bin)
     } else {
-        return;
+        (bin, before)
     };
-    if let Some(slot) = lines.get_mut(between) {
-        *slot = line;
+    if !(2..=WIDEST_FILL).contains(&(high - low)) {
+        return;
+    }
+    let Some(&line) = lines.get(bin) else { return };
+    if let Some(between) = lines.get_mut(low + 1..high) {
+        between.fill(line);
     }
 }

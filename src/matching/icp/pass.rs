@@ -19,9 +19,9 @@ const PER_METRE: f32 = 16_000.0;
 const PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
 
 impl FixedPose {
-    /// Nearest fixed pose; `None` for one that is not finite or farther than 32 m away.
+    /// Nearest fixed pose; `None` for one that is not finite or farther than 27 m away.
     pub fn new(pose: Pose) -> Option<Self> {
-        let inside = |v: f32| v > -32.0 && v < 32.0;
+        let inside = |v: f32| v > -27.0 && v < 27.0;
         if !(inside(pose.x) && inside(pose.y) && pose.theta.is_finite()) {
             return None;
         }
@@ -41,14 +41,13 @@ impl FixedPose {
         )
     }
 
-    /// Started elsewhere: any number of turns, held within the 32 m.
+    /// Started elsewhere.
     pub fn moved_far(self, by: [f32; 3]) -> Self {
         let (s, c) = math::sin_cos(self.turn as i32 as f32 / PER_RADIAN);
-        let limit = 32 * 16_000;
         let ahead = |v: f32| math::round_to_i32(v * PER_METRE);
         Self {
-            x: (self.x + ahead(c * by[0] - s * by[1])).clamp(-limit, limit),
-            y: (self.y + ahead(s * by[0] + c * by[1])).clamp(-limit, limit),
+            x: self.x + ahead(c * by[0] - s * by[1]),
+            y: self.y + ahead(s * by[0] + c * by[1]),
             turn: self
                 .turn
                 .wrapping_add(math::round_to_i32(math::wrap_angle(by[2]) * PER_RADIAN) as u32),
@@ -70,40 +69,46 @@ impl FixedPose {
         self.distance_only(other) + 3.0 * turn
     }
 
-    /// Moved by a step (m, m, rad), itself held within 0.5 m and 0.3 rad.
-    pub fn moved(self, step: [f32; 3]) -> Self {
+    /// Moved by a step: by `dx`, `dy` (1/16 mm) and by `turn` (rad) about the reference's origin, itself held within
+    /// 0.5 m and 0.3 rad, and the pose within [`REACH_MM`] of where the search started.
+    pub fn moved(self, [dx, dy, turn]: [f32; 3], home: Self) -> Self {
         let held = |v: f32, most: f32| math::max(math::min(v, most), -most);
-        let limit = 32 * 16_000;
+        let turn = held(turn, 0.3);
+        let step = |d: f32| math::round_to_i32(held(d, 0.5 * PER_METRE));
+        let reach = |v: i32, home: i32| v.max(home - 16 * REACH_MM).min(home + 16 * REACH_MM);
         Self {
-            x: (self.x + math::round_to_i32(held(step[0], 0.5) * PER_METRE)).clamp(-limit, limit),
-            y: (self.y + math::round_to_i32(held(step[1], 0.5) * PER_METRE)).clamp(-limit, limit),
+            x: reach(self.x + step(dx - turn * self.y as f32), home.x),
+            y: reach(self.y + step(dy + turn * self.x as f32), home.y),
             turn: self
                 .turn
-                .wrapping_add(math::round_to_i32(held(step[2], 0.3) * PER_RADIAN) as u32),
+                .wrapping_add(math::round_to_i32(turn * PER_RADIAN) as u32),
         }
     }
 }
 
+/// How far from its start a search may get (mm).
+const REACH_MM: i32 = 4000;
+
 /// Which points a pass takes, and how far off they may be.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pass {
-    /// Every how many-th point.
-    pub stride: u8,
+    /// Of every so many points ...
+    pub period: u16,
+    /// ... from this one on ...
+    pub first: u16,
+    /// ... so many.
+    pub length: u16,
     /// The gate: points farther than `4 << gate` mm from their line do not count. Half weight at 0.16 of it.
     pub gate: u8,
 }
 
-/// What a pass found.
+/// What passes found.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Sums {
     /// `Σ w a aᵀ`, upper triangle by rows, `a` the row `(mx, my, lever)`.
     h: [i64; 6],
     /// `Σ w a e`.
     b: [i64; 3],
-    /// Bits that levers were shifted down by.
-    lever_shift: u32,
-    /// Points that met a line.
-    pub overlap: u16,
     /// Points nearer to their line than the gate.
     pub inliers: u16,
     /// `Σ w`, Q8.
@@ -129,46 +134,179 @@ const fn kernel() -> [u8; 64] {
     table
 }
 
-/// Points after which the 32-bit sums are moved to 64 bits: 13-bit rows, 8-bit weights cannot overflow before.
+/// A row of the system of equations, with its weight.
+#[derive(Clone, Copy, Default)]
+struct Row {
+    mx: i32,
+    my: i32,
+    lever: i32,
+    /// Residual (1/16 mm).
+    e: i32,
+    /// Q8.
+    w: i32,
+}
+
+/// Rows after which the 32-bit sums are moved to 64 bits: 13-bit rows, 8-bit weights cannot overflow before.
 const BLOCK: usize = 16;
 
 /// Runs one pass of `points` at `at` against `lines`.
 ///
-/// About 65 instructions a point on an M4F, 110 on an M0.
+/// About 110 instructions a point on an M4F.
 pub(super) fn run(
     lines: &[Line],
     points: &[ScanPoint],
     at: FixedPose,
+    lever_shift: u32,
     pass: Pass,
-    first: usize,
 ) -> Sums {
-    let stride = usize::from(pass.stride).max(1);
-    let mut sums = Sums {
-        lever_shift: lever_shift(points),
-        ..Sums::default()
-    };
-    let Some(points) = points.get(first..) else {
-        return sums;
-    };
-    let projection = Projection::new(lines, at);
-    let mut before = 0;
-    for chunk in points.chunks(BLOCK * stride) {
+    let mut sums = Sums::default();
+    let mut projection = Projection::new(lines, at);
+    let mut rows = [Row::default(); BLOCK];
+    let mut filled = 0;
+    for chunk in points.chunks(usize::from(pass.period).max(1)) {
+        let part = chunk.get(usize::from(pass.first)..).unwrap_or_default();
+        for point in part.iter().take(usize::from(pass.length)) {
+            let placed = projection.place(point);
+            let Some(line) = projection.line(point, placed) else {
+                continue;
+            };
+            let Some((e, w)) = residual(line, placed, pass.gate) else {
+                continue;
+            };
+            let (mx, my) = (i32::from(line.mx), i32::from(line.my));
+            let lever = (my * (placed.x >> 4) - mx * (placed.y >> 4)) >> lever_shift;
+            if let Some(row) = rows.get_mut(filled) {
+                *row = Row {
+                    mx,
+                    my,
+                    lever,
+                    e,
+                    w,
+                };
+            }
+            filled += 1;
+            if filled >= BLOCK {
+                sums.add(&rows);
+                filled = 0;
+            }
+        }
+    }
+    sums.add(rows.get(..filled).unwrap_or_default());
+    sums
+}
+
+/// Bits that bring every lever below 2¹³, the bound of a weighted normal: as many as the farthest place has that a
+/// point can come to lie at.
+pub(super) fn lever_shift(points: &[ScanPoint], start: FixedPose) -> u32 {
+    let ranges = points.iter().fold(0, |bits, p| bits | p.range);
+    let moved = start.x.unsigned_abs().max(start.y.unsigned_abs()) / 16 + REACH_MM as u32;
+    33 - (u32::from(ranges) | moved).leading_zeros()
+}
+
+/// Where a point comes to lie in the reference's frame (1/16 mm).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Placed {
+    pub x: i32,
+    pub y: i32,
+}
+
+/// Projection association: the line seen by the reference in the direction of a point.
+pub(super) struct Projection<'a> {
+    lines: &'a [Line],
+    /// Position and half a unit, to be shifted down with the turned point.
+    x: i32,
+    y: i32,
+    sin: i32,
+    cos: i32,
+    /// From a point's bearing to that of its line: the turn of the pose, half a line's width, and what the last point's
+    /// line was farther on because the lidars do not stand at one place.
+    turn: u16,
+    /// Half a line's width.
+    half: u16,
+}
+
+impl<'a> Projection<'a> {
+    /// Points of at most 32 m at poses of at most 31 m (27 m and the reach) stay within 32 bits.
+    pub fn new(lines: &'a [Line], at: FixedPose) -> Self {
+        let (sin, cos) = math::sin_cos_q15_fine(at.turn);
+        let half = (32_768 / (lines.len() as u32).max(1)) as u16;
+        Self {
+            lines,
+            x: (at.x << 11) + (1 << 10),
+            y: (at.y << 11) + (1 << 10),
+            sin,
+            cos,
+            turn: ((at.turn.wrapping_add(1 << 15) >> 16) as u16).wrapping_add(half),
+            half,
+        }
+    }
+
+    pub fn place(&self, point: &ScanPoint) -> Placed {
+        let (px, py) = (i32::from(point.x), i32::from(point.y));
+        Placed {
+            x: self.x.wrapping_add(self.cos * px - self.sin * py) >> 11,
+            y: self.y.wrapping_add(self.sin * px + self.cos * py) >> 11,
+        }
+    }
+
+    /// The line in the direction of the point, `None` where no surface was seen.
+    ///
+    /// The line at the place of the last point's tells how far off that is, to first order: enough for a few lines, and
+    /// for no more. Farther off, the direction is worked out.
+    pub fn line(&mut self, point: &ScanPoint, placed: Placed) -> Option<&'a Line> {
+        const NEAR: i32 = 2;
+        let bins = self.lines.len() as u32;
+        let (x, y) = (placed.x >> 4, placed.y >> 4);
+        let index = (u32::from(point.bearing.0.wrapping_add(self.turn)) * bins) >> 16;
+        let line = self.lines.get(index as usize)?;
+        let across = i32::from(line.ux) * y - i32::from(line.uy) * x;
+        let off = (across + (1 << 15)) >> 16;
+        let mut found = index.wrapping_add(off as u32);
+        if (off + NEAR) as u32 > 2 * NEAR as u32 || found >= bins {
+            let bearing = self.bearing(x, y);
+            self.turn = bearing.wrapping_sub(point.bearing.0);
+            found = (u32::from(bearing) * bins) >> 16;
+        }
+        self.lines.get(found as usize).filter(|line| line.is_some())
+    }
+
+    /// Direction of a place, half a line's width on. Apart, so that the loop around it keeps its registers.
+    #[cold]
+    #[inline(never)]
+    fn bearing(&self, x: i32, y: i32) -> u16 {
+        math::atan2_turn(y, x).wrapping_add(self.half)
+    }
+}
+
+/// Weighted distance of a point from its line (1/16 mm) and its weight (Q8); `None` beyond the gate or 8 m away.
+fn residual(line: &Line, placed: Placed, gate: u8) -> Option<(i32, i32)> {
+    // Below 2¹⁷ the products with 13-bit normals stay in 32 bits.
+    const FAR: i32 = 1 << 17;
+    let (dx, dy) = (
+        placed.x - (i32::from(line.qx) << 4),
+        placed.y - (i32::from(line.qy) << 4),
+    );
+    if ((dx + FAR) | (dy + FAR)) as u32 >= 2 * FAR as u32 {
+        return None;
+    }
+    let e = (i32::from(line.mx) * dx + i32::from(line.my) * dy + 512) >> 10;
+    let weight = KERNEL.get((e.unsigned_abs() >> (gate & 31)) as usize)?;
+    Some((e, i32::from(*weight)))
+}
+
+impl Sums {
+    /// Adds at most [`BLOCK`] rows.
+    fn add(&mut self, rows: &[Row]) {
         let mut h = [0i32; 6];
         let mut b = [0i32; 3];
-        for point in chunk.iter().step_by(stride) {
-            let placed = projection.place(point);
-            let Some(line) = projection.line(&placed) else {
-                continue;
-            };
-            sums.overlap += 1;
-            let Some(e) = residual(line, &placed, pass.gate) else {
-                continue;
-            };
-            sums.inliers += 1;
-            let step = (e.unsigned_abs() >> pass.gate) as usize;
-            let w = i32::from(KERNEL.get(step).copied().unwrap_or(0));
-            let (mx, my) = (i32::from(line.mx), i32::from(line.my));
-            let lever = (my * (placed.rx >> 4) - mx * (placed.ry >> 4)) >> sums.lever_shift;
+        for row in rows {
+            let &Row {
+                mx,
+                my,
+                lever,
+                e,
+                w,
+            } = row;
             let (wx, wy, wt) = ((w * mx) >> 8, (w * my) >> 8, (w * lever) >> 8);
             h[0] += wx * mx;
             h[1] += wx * my;
@@ -179,129 +317,39 @@ pub(super) fn run(
             b[0] += wx * e;
             b[1] += wy * e;
             b[2] += wt * e;
-            sums.weight += w as u32;
-            let we = (w * e) >> 4;
-            sums.cost += i64::from(we * (e >> 4));
-            sums.cross += i64::from(we * before);
-            before = e >> 4;
         }
-        for (sum, block) in sums.h.iter_mut().zip(h) {
+        let (mut weight, mut cost, mut cross, mut before) = (0, 0i32, 0i32, 0);
+        for row in rows {
+            let (e, we) = (row.e >> 4, (row.w * row.e) >> 4);
+            weight += row.w as u32;
+            cost += we * e;
+            cross += we * before;
+            before = e;
+        }
+        for (sum, block) in self.h.iter_mut().zip(h) {
             *sum += i64::from(block);
         }
-        for (sum, block) in sums.b.iter_mut().zip(b) {
+        for (sum, block) in self.b.iter_mut().zip(b) {
             *sum += i64::from(block);
         }
+        self.weight += weight;
+        self.cost += i64::from(cost);
+        self.cross += i64::from(cross);
+        self.inliers += rows.len() as u16;
     }
-    sums
-}
 
-/// Bits that bring every lever below 2¹³, the bound of a weighted normal: as many as the farthest range has.
-fn lever_shift(points: &[ScanPoint]) -> u32 {
-    let farthest = points
-        .iter()
-        .fold(0, |most, p| if p.range > most { p.range } else { most });
-    32 - u32::from(farthest).leading_zeros()
-}
-
-/// Where a point comes to lie.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Placed {
-    /// Turned, not yet moved (1/16 mm).
-    pub rx: i32,
-    /// As `rx`.
-    pub ry: i32,
-    /// In the reference's frame (1/16 mm).
-    pub x: i32,
-    /// As `x`.
-    pub y: i32,
-    /// Bearing of the point there if the lidars stood at the same place.
-    turn: u16,
-}
-
-/// Projection association: the line seen by the reference in the direction of a point.
-pub(super) struct Projection<'a> {
-    lines: &'a [Line],
-    at: FixedPose,
-    sin: i32,
-    cos: i32,
-    /// Turn and half a line's width.
-    turn: u16,
-    /// Half a line's width.
-    half: u16,
-}
-
-impl<'a> Projection<'a> {
-    pub fn new(lines: &'a [Line], at: FixedPose) -> Self {
-        let (sin, cos) = math::sin_cos_q15_fine(at.turn);
-        let half = (32_768 / (lines.len() as u32).max(1)) as u16;
-        Self {
-            lines,
-            at,
-            sin,
-            cos,
-            turn: ((at.turn.wrapping_add(1 << 15) >> 16) as u16).wrapping_add(half),
-            half,
+    /// Takes over what earlier passes knew of the pose: everything but their gradient, which the step between has
+    /// brought to nought.
+    pub fn remember(&mut self, earlier: &Self) {
+        for (sum, old) in self.h.iter_mut().zip(earlier.h) {
+            *sum += old;
         }
+        self.inliers += earlier.inliers;
+        self.weight += earlier.weight;
+        self.cost += earlier.cost;
+        self.cross += earlier.cross;
     }
 
-    pub fn place(&self, point: &ScanPoint) -> Placed {
-        let (px, py) = (i32::from(point.x), i32::from(point.y));
-        let rx = (self.cos * px - self.sin * py + (1 << 10)) >> 11;
-        let ry = (self.sin * px + self.cos * py + (1 << 10)) >> 11;
-        Placed {
-            rx,
-            ry,
-            x: rx + self.at.x,
-            y: ry + self.at.y,
-            turn: point.bearing.0.wrapping_add(self.turn),
-        }
-    }
-
-    /// The line in the direction of the point, `None` where no surface was seen.
-    ///
-    /// The line where the point would be if the lidars stood at one place tells how far off that is, to first order:
-    /// enough for a few lines, and for no more. Farther off, the direction is worked out.
-    pub fn line(&self, placed: &Placed) -> Option<&'a Line> {
-        const NEAR: i32 = 2;
-        let bins = self.lines.len() as i32;
-        let (x, y) = (placed.x >> 4, placed.y >> 4);
-        let index = ((u32::from(placed.turn) * bins as u32) >> 16) as i32;
-        let line = self.lines.get(index as usize)?;
-        let across = i32::from(line.ux) * y - i32::from(line.uy) * x;
-        let off = (across + (1 << 15)) >> 16;
-        let found = if line.is_some() && (-NEAR..=NEAR).contains(&off) {
-            let moved = index + off;
-            if moved < 0 {
-                moved + bins
-            } else if moved >= bins {
-                moved - bins
-            } else {
-                moved
-            }
-        } else {
-            let turn = math::atan2_turn(y, x).wrapping_add(self.half);
-            ((u32::from(turn) * bins as u32) >> 16) as i32
-        };
-        self.lines.get(found as usize).filter(|line| line.is_some())
-    }
-}
-
-/// Weighted distance of a point from its line (1/16 mm); `None` beyond the gate or a metre away.
-pub(super) fn residual(line: &Line, placed: &Placed, gate: u8) -> Option<i32> {
-    let (dx, dy) = (
-        placed.x - (i32::from(line.qx) << 4),
-        placed.y - (i32::from(line.qy) << 4),
-    );
-    // Below 2¹⁷ the products with 13-bit normals stay in 32 bits.
-    const FAR: u32 = 1 << 17;
-    if dx.unsigned_abs() >= FAR || dy.unsigned_abs() >= FAR {
-        return None;
-    }
-    let e = (i32::from(line.mx) * dx + i32::from(line.my) * dy + 512) >> 10;
-    (e.unsigned_abs() >> gate < 64).then_some(e)
-}
-
-impl Sums {
     /// Sum of the weights.
     pub fn total_weight(&self) -> f32 {
         self.weight as f32 / 256.0
@@ -324,23 +372,42 @@ impl Sums {
         math::sqrt(self.cost as f32 / self.weight as f32) * 1e-3
     }
 
-    /// The normal equations over a step (m, m, rad): `(H, -b)`, residuals in metres.
-    pub fn equations(&self) -> (Sym3, [f32; 3]) {
-        /// Rows carry normals in Q10; their weights were shifted out already.
-        const N: f32 = 1.0 / 1024.0;
-        let lever = (1u32 << self.lever_shift) as f32 * (1e-3 / 1024.0);
+    /// The Gauss–Newton step by the normal equations: see [`FixedPose::moved`]. `None` where they are singular.
+    pub fn step(&self, lever_shift: u32) -> Option<[f32; 3]> {
         let [xx, xy, xt, yy, yt, tt] = self.h.map(|v| v as f32);
-        let [bx, by, bt] = self.b.map(|v| v as f32 / PER_METRE);
-        (
-            Sym3 {
-                xx: xx * N * N,
-                xy: xy * N * N,
-                xt: xt * N * lever,
-                yy: yy * N * N,
-                yt: yt * N * lever,
-                tt: tt * lever * lever,
-            },
-            [-bx * N, -by * N, -bt * lever],
-        )
+        let h = Sym3 {
+            xx,
+            xy,
+            xt,
+            yy,
+            yt,
+            tt,
+        };
+        let [dx, dy, turn] = h.solve(self.b.map(|v| v as f32))?;
+        // Normals are Q10, residuals 1/16 mm, levers mm of Q10 shifted down.
+        let per_lever = 64.0 / (1u32 << (lever_shift & 31)) as f32;
+        Some([-1024.0 * dx, -1024.0 * dy, -per_lever * turn])
     }
+
+    /// `Σ w a aᵀ` over a motion of the lidar, which is at `at` (1, m, m²).
+    pub fn curvature(&self, lever_shift: u32, at: FixedPose) -> Sym3 {
+        const N: f32 = 1.0 / 1024.0;
+        let lever = (1u32 << (lever_shift & 31)) as f32 * (1e-3 / 1024.0);
+        let [xx, xy, xt, yy, yt, tt] = self.h.map(|v| v as f32);
+        Sym3 {
+            xx: xx * N * N,
+            xy: xy * N * N,
+            xt: xt * N * lever,
+            yy: yy * N * N,
+            yt: yt * N * lever,
+            tt: tt * lever * lever,
+        }
+        .turning_about(at.x as f32 / PER_METRE, at.y as f32 / PER_METRE)
+    }
+}
+
+/// Length of a step of [`Sums::step`] (m), a turn counted at 3 m.
+pub(super) fn length(step: [f32; 3]) -> f32 {
+    let [x, y, turn] = step.map(math::abs);
+    (x + y) / PER_METRE + 3.0 * turn
 }

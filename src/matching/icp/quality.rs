@@ -14,8 +14,8 @@ use crate::{
 /// normals alone amounts to in a corridor.
 const WEAK_SHARE: f32 = 0.02;
 /// How much larger errors are than the residuals of one scan say: the reference's noise is as large as the scan's and
-/// averaged over in its lines. Calibrated on simulated and recorded pairs (NEES 2.4 and 3.9, 3 is ideal).
-const INFLATION: f32 = 1.8;
+/// averaged over in its lines. Calibrated on simulated and recorded pairs (NEES 2.1 and 4.1, 3 is ideal).
+const INFLATION: f32 = 1.9;
 /// Errors that no residual shows (m, rad).
 const FLOOR: (f32, f32) = (0.0005, 0.0001);
 /// Longest last step of a match that is believed (m).
@@ -31,28 +31,31 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         });
     }
     let lever = mean_range(task);
-    let step = best.last.length;
-    if step > TOO_LONG {
-        return Err(MatchError::NotConverged { step });
-    }
     if best.candidate.value < config.min_score {
         return Err(MatchError::Unlikely {
             score: best.candidate.value,
         });
     }
-    let (h, _) = best.last.sums.equations();
-    let scaled = h.theta_scaled(1.0 / lever);
-    let eigen = scaled.eigen();
-    let threshold = WEAK_SHARE * best.last.sums.total_weight();
-    if eigen[1].0 < threshold {
-        return Err(MatchError::Degenerate);
-    }
-    let residual = best.last.sums.residual();
+    let sums = &best.last.sums;
+    let mut h = sums.curvature(task.lever_shift, best.last.at);
+    let residual = sums.residual();
     let noise = math::max(residual * residual, config.range_sigma * config.range_sigma);
-    let mut pose = best.candidate.at.pose();
-    let mut weak = None;
-    if eigen[0].0 < threshold {
-        let [x, y, t] = eigen[0].1;
+    let mut pose = best.last.at.pose();
+    let weak = weak_direction(
+        &h.theta_scaled(1.0 / lever),
+        lever,
+        noise,
+        sums.total_weight(),
+    )?;
+    let step = best.last.length;
+    if weak.is_none() && step > TOO_LONG {
+        return Err(MatchError::NotConverged { step });
+    }
+    if let Some(WeakDirection { direction, .. }) = weak {
+        let [x, y, t] = direction;
+        // What the noise of the normals pretends to know along it is not known.
+        let pretended = h.theta_scaled(1.0 / lever).quadratic(direction);
+        h = h.plus(&outer([x, y, t * lever]).scaled(-pretended));
         let moved = [
             pose.x - guess.x,
             pose.y - guess.y,
@@ -64,13 +67,8 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
             pose.y - along * y,
             pose.theta - along * t / lever,
         );
-        weak = Some(WeakDirection {
-            direction: eigen[0].1,
-            lever,
-            sigma: math::sqrt(noise / math::max(eigen[0].0, 1e-3)),
-        });
     }
-    let alike = best.last.sums.correlation();
+    let alike = sums.correlation();
     let information = h.scaled(1.0 / noise);
     // A direction that is not determined at all still has a finite variance: 10 m, 10 rad.
     let bounded = information.plus(&Sym3::diagonal(0.01, 0.01, 0.01));
@@ -85,15 +83,54 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         covariance: Covariance(covariance),
         information: Information(information),
         inliers: best.last.sums.inliers,
-        overlap: best.last.sums.overlap,
+        overlap: best.candidate.overlap,
         beams: task.points.len() as u16,
         score: best.candidate.value,
         residual,
         weak,
-        iterations: best.candidate.passes,
+        iterations: best.iterations,
         starts: best.starts,
         rival: best.ratio,
     })
+}
+
+/// The direction that is not determined, if there is one; refuses two.
+///
+/// `h` is the curvature with headings as long as distances.
+fn weak_direction(
+    h: &Sym3,
+    lever: f32,
+    noise: f32,
+    weight: f32,
+) -> Result<Option<WeakDirection>, MatchError> {
+    let threshold = WEAK_SHARE * weight;
+    // No eigenvalue is smaller than the inverse of the sum of their inverses: most matches need no more.
+    if let Some(inverse) = h.inverse()
+        && (inverse.xx + inverse.yy + inverse.tt) * threshold < 1.0
+    {
+        return Ok(None);
+    }
+    let [(least, direction), (second, _), _] = h.eigen();
+    if second < threshold {
+        return Err(MatchError::Degenerate);
+    }
+    Ok((least < threshold).then(|| WeakDirection {
+        direction,
+        lever,
+        sigma: math::sqrt(noise / math::max(least, 1e-3)),
+    }))
+}
+
+/// `v vᵀ`.
+fn outer([x, y, t]: [f32; 3]) -> Sym3 {
+    Sym3 {
+        xx: x * x,
+        xy: x * y,
+        xt: x * t,
+        yy: y * y,
+        yt: y * t,
+        tt: t * t,
+    }
 }
 
 /// Mean distance of the points (m), which makes a heading comparable with a distance.

@@ -8,12 +8,11 @@ use crate::{matching::icp::lines, scan::ScanPoint};
 /// standard deviation, relative to that of a beam that hits head on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Line {
-    /// Point on the line (mm).
+    /// Point on the line (mm); -32 768 stands for no line.
     pub qx: i16,
     /// Point on the line (mm).
     pub qy: i16,
     /// Weighted normal, Q10: of length 1024 for a beam that hits head on, up to 5 times that for a grazing one.
-    /// Both 0: there is no line.
     pub mx: i16,
     /// Weighted normal, Q10.
     pub my: i16,
@@ -26,20 +25,20 @@ pub struct Line {
 }
 
 impl Line {
-    /// No surface.
+    /// No surface: a place that no point has, and a direction far off every point's.
     pub const NONE: Self = Self {
-        qx: 0,
+        qx: i16::MIN,
         qy: 0,
         mx: 0,
         my: 0,
-        ux: 0,
+        ux: 16_383,
         uy: 0,
     };
 
     /// Whether a surface was seen there.
     #[must_use]
     pub const fn is_some(&self) -> bool {
-        self.mx != 0 || self.my != 0
+        self.qx != i16::MIN
     }
 }
 

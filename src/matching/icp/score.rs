@@ -36,12 +36,12 @@ const fn agreement() -> [u8; 32] {
 }
 
 /// Judges `at` by every `stride`-th point. About 60 instructions a point on an M4F.
-pub(super) fn judge(lines: &[Line], points: &[ScanPoint], at: FixedPose, stride: usize) -> Score {
-    let projection = Projection::new(lines, at);
+pub(super) fn judge(lines: &[Line], points: &[ScanPoint], at: FixedPose, stride: u16) -> Score {
+    let mut projection = Projection::new(lines, at);
     let mut score = Score::default();
-    for point in points.iter().step_by(stride.max(1)) {
+    for point in points.iter().step_by(usize::from(stride).max(1)) {
         let placed = projection.place(point);
-        let Some(line) = projection.line(&placed) else {
+        let Some(line) = projection.line(point, placed) else {
             continue;
         };
         score.overlap += 1;
