@@ -21,6 +21,9 @@ pub struct OdometryConfig {
     pub min_range: f32,
     /// Longest range that is used (m). Default 32.
     pub max_range: f32,
+    /// Scans of more beams are thinned by averaging neighbours: see [`PointsConfig::enough`]. Default 240: 480 keeps
+    /// all 450 beams of an LD06 and takes twice the time.
+    pub enough: u16,
     /// A new keyframe is made this far from the last one (m). Default 0.5: near enough for most surfaces to be seen by
     /// both, far enough for errors not to add up often.
     pub keyframe_distance: f32,
@@ -45,6 +48,7 @@ impl OdometryConfig {
         mount: Mount::DEFAULT,
         min_range: 0.05,
         max_range: 32.0,
+        enough: 240,
         keyframe_distance: 0.5,
         keyframe_turn: 0.4,
         keyframe_overlap: 0.6,
@@ -253,7 +257,7 @@ impl<const N: usize> Odometry<N> {
             min_range: self.config.min_range,
             max_range: self.config.max_range,
             upside_down: self.config.mount.upside_down,
-            ..PointsConfig::DEFAULT
+            enough: self.config.enough,
         };
         let during = Twist::from_motion(motion, seconds);
         let twist = self.config.mount.lidar_twist(during);
@@ -366,8 +370,8 @@ impl<const N: usize> Odometry<N> {
     }
 }
 
-/// Whether two motions bend a scan differently: by more than 1 cm or 0.3°.
+/// Whether two motions bend a scan differently: by more than 5 mm or 0.1°.
 fn differs(a: Pose, b: Pose) -> bool {
     let off = a.between(b);
-    off.distance() > 0.01 || math::abs(off.theta) > 0.005
+    off.distance() > 0.005 || math::abs(off.theta) > 0.002
 }
