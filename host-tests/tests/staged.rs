@@ -382,7 +382,8 @@ fn the_fused_path_is_these_stages_in_integers() {
         metres = metres.max(off.distance());
         degrees = degrees.max(off.theta.to_degrees().abs());
         assert!(
-            off.distance() < 0.002 && off.theta.to_degrees().abs() < 0.05,
+            // Both are about 1.5 mm from the truth, by lines laid in two ways.
+            off.distance() < 0.003 && off.theta.to_degrees().abs() < 0.05,
             "seed {seed}: {} mm, {} degrees",
             1000.0 * off.distance(),
             off.theta.to_degrees()

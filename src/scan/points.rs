@@ -29,7 +29,7 @@ pub struct PointsConfig {
     /// The lidar hangs head down: bearings run the other way round. Default false.
     pub upside_down: bool,
     /// Scans of more beams are thinned to about so many points by averaging neighbours on one surface: nothing of what
-    /// they know is lost, and everything after costs as much less. Default 240; `u16::MAX` leaves every scan as it is.
+    /// they know is lost, and everything after costs as much less. Default `u16::MAX`: every beam is a point.
     pub enough: u16,
 }
 
@@ -39,7 +39,7 @@ impl PointsConfig {
         min_range: 0.05,
         max_range: 32.0,
         upside_down: false,
-        enough: 240,
+        enough: u16::MAX,
     };
 }
 

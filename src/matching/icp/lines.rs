@@ -75,12 +75,12 @@ fn run_length(points: &[ScanPoint]) -> usize {
         let turn = u32::from((b.bearing.0.wrapping_sub(a.bearing.0) as i16).unsigned_abs());
         let step = u32::from(a.range.abs_diff(b.range));
         // Most neighbours pass here.
-        if turn <= GAP_TURN && step <= GAP_MM {
-            return false;
+        if turn > GAP_TURN || step <= GAP_MM {
+            return turn > GAP_TURN;
         }
         // 2π/65536 is 25.13/2¹⁸.
         let across = (u32::from(a.range.min(b.range)) * turn * 25) >> 18;
-        turn > GAP_TURN || step > GAP_MM + GAP_SLOPE * across
+        step > GAP_MM + GAP_SLOPE * across
     });
     breaks.map_or(points.len(), |at| at + 1)
 }

@@ -375,6 +375,9 @@ impl Sums {
     /// The Gauss–Newton step by the normal equations: see [`FixedPose::moved`]. `None` where they are singular.
     pub fn step(&self, lever_shift: u32) -> Option<[f32; 3]> {
         let [xx, xy, xt, yy, yt, tt] = self.h.map(|v| v as f32);
+        // A direction that the points leave open keeps still instead of making the system singular.
+        let ridge = 1e-4 * (xx + yy + tt);
+        let (xx, yy, tt) = (xx + ridge, yy + ridge, tt + ridge);
         let h = Sym3 {
             xx,
             xy,

@@ -18,6 +18,8 @@ const WEAK_SHARE: f32 = 0.02;
 const INFLATION: f32 = 1.9;
 /// Errors that no residual shows (m, rad).
 const FLOOR: (f32, f32) = (0.0005, 0.0001);
+/// How far off the guess may be along a direction that only it tells (m).
+const GUESS_SIGMA: f32 = 0.3;
 /// Longest last step of a match that is believed (m).
 const TOO_LONG: f32 = 0.05;
 
@@ -55,7 +57,8 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         let [x, y, t] = direction;
         // What the noise of the normals pretends to know along it is not known.
         let pretended = h.theta_scaled(1.0 / lever).quadratic(direction);
-        h = h.plus(&outer([x, y, t * lever]).scaled(-pretended));
+        let known = noise / (GUESS_SIGMA * GUESS_SIGMA);
+        h = h.plus(&outer([x, y, t * lever]).scaled(known - pretended));
         let moved = [
             pose.x - guess.x,
             pose.y - guess.y,
