@@ -199,7 +199,7 @@ fn a_circle_is_weak_about_its_centre() {
         let seen = place.then(found.pose.into());
         let truth = place.then(motion);
         let off = seen.distance() - truth.distance();
-        assert!(off.abs() < 0.022, "{seed}: {off} m off the arc");
+        assert!(off.abs() < 0.03, "{seed}: {off} m off the arc");
     }
 }
 

@@ -376,7 +376,7 @@ impl Sums {
     pub fn step(&self, lever_shift: u32) -> Option<[f32; 3]> {
         let [xx, xy, xt, yy, yt, tt] = self.h.map(|v| v as f32);
         // A direction that the points leave open keeps still instead of making the system singular.
-        let ridge = 1e-4 * (xx + yy + tt);
+        let ridge = 4e-6 * (xx + yy + tt);
         let (xx, yy, tt) = (xx + ridge, yy + ridge, tt + ridge);
         let h = Sym3 {
             xx,
