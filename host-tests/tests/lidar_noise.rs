@@ -29,6 +29,9 @@ fn stream(sensor: &mut dyn Encoder, beams: usize) -> Vec<u8> {
     line
 }
 
+/// How often the faults are drawn anew.
+const RUNS: u64 = 64;
+
 /// Keeps the frames that are still whole, where a parser that drops a failed frame in one piece loses more.
 #[test]
 fn ld19_keeps_every_frame_that_400_faults_leave() {
@@ -36,7 +39,7 @@ fn ld19_keeps_every_frame_that_400_faults_leave() {
     let sent: HashSet<&[u8]> = clean.chunks_exact(47).collect();
     assert_eq!(sent.len(), 1875);
     let (mut kept_in_all, mut dropping_in_all, mut wrong) = (0, 0, 0);
-    for seed in 0..8 {
+    for seed in 0..RUNS {
         let mut line = clean.clone();
         damage::hit(&mut line, 400, &mut ChaCha8Rng::seed_from_u64(seed));
         let whole = line.windows(47).filter(|window| sent.contains(window));
@@ -44,12 +47,24 @@ fn ld19_keeps_every_frame_that_400_faults_leave() {
 
         let mut parser = ld06::Parser::new();
         let mut kept = 0;
-        for (k, &byte) in line.iter().enumerate() {
-            if parser.push(byte).is_some() {
-                let known = sent.contains(&line[k - 46..=k]);
-                kept += usize::from(known);
-                wrong += usize::from(!known);
-            }
+        for &byte in &line {
+            let Some(packet) = parser.push(byte) else {
+                continue;
+            };
+            let points: Vec<_> = packet.samples().collect();
+            let frame = encoder::ld06::Frame {
+                speed_deg_per_s: packet.speed_deg_per_s,
+                start_cdeg: packet.start_cdeg,
+                end_cdeg: packet.end_cdeg,
+                stamp_ms: packet.stamp_ms,
+                points: std::array::from_fn(|k| {
+                    let mm = points[k].range_mm.unwrap_or(0.0) as u16;
+                    (mm, points[k].quality as u8)
+                }),
+            };
+            let known = sent.contains(&frame.bytes()[..]);
+            kept += usize::from(known);
+            wrong += usize::from(!known);
         }
         assert_eq!(kept, whole, "seed {seed}");
         kept_in_all += kept;
@@ -62,15 +77,20 @@ fn ld19_keeps_every_frame_that_400_faults_leave() {
         }
         dropping_in_all += dropping;
     }
+    let runs = RUNS as usize;
     println!(
-        "of 1875 frames with 400 faults: {} kept, {} when failed frames are dropped whole; {wrong} wrong in 8 runs",
-        kept_in_all / 8,
-        dropping_in_all / 8
+        "of 1875 frames with 400 faults: {} kept, {} when failed frames are dropped whole; {wrong} wrong in {RUNS} runs",
+        kept_in_all / runs,
+        dropping_in_all / runs
     );
-    // The CRC alone lets one of 256 damaged frames pass, a dozen of these 3200; the angles and the stamp betray most.
-    assert!(wrong <= 1, "{wrong}");
-    assert!(kept_in_all >= 8 * 1487, "{kept_in_all}");
-    assert!(kept_in_all > dropping_in_all + 8 * 50, "{dropping_in_all}");
+    // The CRC alone lets one of 256 damaged frames pass, more than one in each run. What is left has lost one byte and
+    // gained another, so that angles and stamp are in their places.
+    assert!(wrong <= 2, "{wrong}");
+    assert!(kept_in_all >= runs * 1487, "{kept_in_all}");
+    assert!(
+        kept_in_all > dropping_in_all + runs * 50,
+        "{dropping_in_all}"
+    );
 }
 
 #[test]

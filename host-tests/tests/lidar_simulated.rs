@@ -10,10 +10,6 @@ const ALLOWED: (f64, f64) = (0.08, 2.0);
 
 #[test]
 #[ignore = "five slow lidars (rplidar-express, ydlidar-g4, xv11, xv11-early, delta-2a) end more than 8 cm or 2 deg off"]
-#[cfg_attr(
-    debug_assertions,
-    ignore = "a minute's drive for each of thirty sensors"
-)]
 fn every_lidar_finds_its_way() {
     let out = std::env::temp_dir().join(format!("beamfix-lidars-{}", std::process::id()));
     let mut too_far = Vec::new();

@@ -18,6 +18,10 @@ pub enum Verdict {
     CheckFailed,
     /// A frame of so many bytes that passes every check.
     Frame(usize),
+    /// The same, but it does not fit what came before: taken only where another frame's first byte follows.
+    ///
+    /// A frame that a lost or an added byte has shifted, and that passes its check code by chance, is not followed by one.
+    Doubtful(usize),
     /// Another good frame, without measurements: not skipped, not given.
     Answer(usize),
 }
@@ -33,7 +37,7 @@ pub struct Frame<'a> {
 
 /// Buffer of the longest frame and a window that slides over the stream.
 ///
-/// L + 32 bytes. A byte inside a frame costs about a dozen instructions; the protocol is asked only where it can
+/// L + 32 bytes; one byte more than the longest frame where there are doubtful ones. A byte inside a frame costs about a dozen instructions; the protocol is asked only where it can
 /// decide something. Bytes are moved at most once per dropped candidate.
 #[derive(Debug, Clone)]
 pub struct Framer<const L: usize> {
@@ -83,13 +87,14 @@ impl<const L: usize> Framer<L> {
         self.examine(judge)
     }
 
-    /// Gives a further frame that is complete among the bytes held.
-    pub fn pull(&mut self, judge: impl FnMut(&[u8]) -> Verdict) -> Option<Frame<'_>> {
+    /// Gives a further frame that is complete among the bytes held, when no more bytes come.
+    pub fn pull(&mut self, mut judge: impl FnMut(&[u8]) -> Verdict) -> Option<Frame<'_>> {
         self.drop_front(self.taken);
-        if self.len < self.needed {
-            return None;
-        }
-        self.examine(judge)
+        self.examine(|bytes| match judge(bytes) {
+            // Nothing can follow the last one.
+            Verdict::Doubtful(length) if length >= bytes.len() => Verdict::Frame(length),
+            verdict => verdict,
+        })
     }
 
     /// Bytes held that no decision has been made on.
@@ -114,6 +119,20 @@ impl<const L: usize> Framer<L> {
             }
             match judge(rest) {
                 Verdict::Frame(length) if length != 0 && length <= rest.len() => break length,
+                Verdict::Doubtful(length) if length != 0 && length <= rest.len() => {
+                    match rest.get(length) {
+                        Some(next) if rest.first() == Some(next) => break length,
+                        Some(_) => {
+                            self.counters.check_errors = self.counters.check_errors.wrapping_add(1);
+                        }
+                        None if length < L => {
+                            self.drop_front(start);
+                            self.needed = length + 1;
+                            return None;
+                        }
+                        None => break length,
+                    }
+                }
                 Verdict::Need(needed) if needed > rest.len() && needed <= L => {
                     self.drop_front(start);
                     self.needed = needed;
@@ -226,6 +245,21 @@ mod tests {
         let counters = framer.counters();
         assert_eq!((counters.answers, counters.skipped_bytes), (2, 0));
         assert_eq!(framer.pending_bytes(), 1);
+    }
+
+    #[test]
+    fn a_doubtful_frame_is_taken_where_another_follows_or_nothing() {
+        let doubt = |bytes: &[u8]| match judge(bytes) {
+            Verdict::Frame(length) => Verdict::Doubtful(length),
+            verdict => verdict,
+        };
+        let mut framer = Framer::<8>::new();
+        let given =
+            [2, 3, 5, 2, 3, 5, 0, 2, 3, 5].map(|byte| framer.push(byte, doubt).is_some() as usize);
+        assert_eq!(given, [0, 0, 0, 1, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(framer.counters().check_errors, 1);
+        assert_eq!(framer.pending_bytes(), 3);
+        assert!(framer.pull(doubt).is_some() && framer.pull(doubt).is_none());
     }
 
     #[test]

@@ -111,6 +111,21 @@ impl Stamps {
         self.period_q8
     }
 
+    /// Whether a frame with this stamp can follow the last one, after a short gap at most.
+    #[must_use]
+    pub fn is_due(&self, stamp_ms: u16) -> bool {
+        /// Dozens of frames (ms).
+        const SHORT: u32 = 100;
+
+        self.stamp_ms
+            .is_none_or(|previous| self.elapsed_ms(previous, stamp_ms) <= SHORT)
+    }
+
+    fn elapsed_ms(&self, previous: u16, stamp_ms: u16) -> u32 {
+        let wrap = if stamp_ms < previous { self.wrap_ms } else { 0 };
+        (u32::from(stamp_ms) + u32::from(wrap)).saturating_sub(previous.into())
+    }
+
     /// Time (µs) of the first beam of the frame that has this stamp.
     ///
     /// Of a gap longer than the stamps' wrap only the remainder is seen.
@@ -123,8 +138,7 @@ impl Stamps {
             self.first_us = self.stamp_us;
             return self.first_us;
         };
-        let wrap = if stamp_ms < previous { self.wrap_ms } else { 0 };
-        let elapsed_ms = (u32::from(stamp_ms) + u32::from(wrap)).saturating_sub(previous.into());
+        let elapsed_ms = self.elapsed_ms(previous, stamp_ms);
         self.stamp_us = self.stamp_us.wrapping_add(elapsed_ms * 1000);
 
         let steady_q8 = self.fraction_q8 + u32::from(self.beams) * self.period_q8;
