@@ -1,7 +1,6 @@
 //! What every driver costs on the emulated Cortex-M0, and that it finds the host's beams there.
 
-use beamfix::lidar::Model;
-use host_tests::board::{Board, drivers::measure};
+use host_tests::board::drivers::{PROMISES, measure_all, table};
 
 #[test]
 #[cfg_attr(
@@ -9,28 +8,15 @@ use host_tests::board::{Board, drivers::measure};
     ignore = "once is enough: the firmware is always a release build"
 )]
 fn drivers_on_the_cortex_m0() {
-    let board = Board::named("m0").expect("there");
-    println!(
-        "instructions a byte; their share of 48 MHz at the rate the sensor sends, and on a full line; memory"
-    );
-    for model in Model::ALL {
-        let cost = measure(board, model).unwrap_or_else(|error| panic!("{error:#}"));
-        let full_line = cost.per_byte * f64::from(model.baud) / 10.0;
-        println!(
-            "{:<18} {:>6.1} {:>5.1} % {:>5.1} %  parser {:>4} B, packet {:>4} B, stack {:>5} B",
-            model.name,
-            cost.per_byte,
-            cost.per_byte * cost.bytes_per_s / 48e4,
-            full_line / 48e4,
-            cost.parser_bytes,
-            cost.packet_bytes,
-            cost.stack_bytes
-        );
+    let costs = measure_all(|| ()).unwrap_or_else(|error| panic!("{error:#}"));
+    println!("{}", table(&costs));
+    for (lidar, mhz, core, bar) in PROMISES {
+        let cost = costs
+            .iter()
+            .find(|cost| cost.lidar == lidar)
+            .expect("measured");
         // Counted in instructions, of which a Cortex-M0 does two in three cycles of such code.
-        match model.name {
-            "ld06" => assert!(full_line <= 0.05 * 48e6, "LD06: {full_line} a second"),
-            "rplidar-dense" => assert!(full_line <= 0.15 * 133e6, "S2: {full_line} a second"),
-            _ => {}
-        }
+        let cycles = 1.5 * cost.full_line_share(mhz);
+        assert!(cycles <= bar, "{lidar}: {cycles} % of a {core}");
     }
 }

@@ -1,17 +1,24 @@
 //! What a lidar's driver costs on a board: instructions a byte, memory.
 
+use std::path::Path;
+
 use anyhow::{Result, ensure};
 use beamfix::lidar::{Model, Packet, Protocol};
+use serde::Serialize;
 
 use super::{Board, Count, emulator};
 use crate::decode::{WithParser, with_parser};
 use crate::encoder::{self, Echo};
 
 /// What a driver costs.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cost {
+    /// The sensor.
+    pub lidar: &'static str,
+    /// Bits a second of its line.
+    pub baud: u32,
     /// Instructions a byte, from the line to the beams.
-    pub per_byte: f64,
+    pub instructions_per_byte: f64,
     /// Bytes of the parser.
     pub parser_bytes: u32,
     /// Bytes of a packet.
@@ -21,6 +28,70 @@ pub struct Cost {
     /// Bytes a second that the sensor sends.
     pub bytes_per_s: f64,
 }
+
+impl Cost {
+    /// Share (percent) of a core of `mhz` that the sensor's bytes take, in instructions.
+    #[must_use]
+    pub fn share(&self, mhz: f64) -> f64 {
+        self.instructions_per_byte * self.bytes_per_s / (mhz * 1e4)
+    }
+
+    /// The same of a line without any pause.
+    #[must_use]
+    pub fn full_line_share(&self, mhz: f64) -> f64 {
+        self.instructions_per_byte * f64::from(self.baud) / 10.0 / (mhz * 1e4)
+    }
+}
+
+/// Every model's driver on the Cortex-M0.
+pub fn measure_all(mut each: impl FnMut()) -> Result<Vec<Cost>> {
+    let board = Board::named("m0")?;
+    let elf = board.build("drivers")?;
+    let mut costs = Vec::new();
+    for model in Model::ALL {
+        costs.push(measure(board, &elf, model)?);
+        each();
+    }
+    Ok(costs)
+}
+
+/// The costs as a table, and what is promised of two of them.
+#[must_use]
+pub fn table(costs: &[Cost]) -> String {
+    let mut text = String::from(
+        "driver, on the Cortex-M0  parser B  packet B  stack B  instructions a byte  of 48 MHz as sent, on a full line",
+    );
+    for cost in costs {
+        text += &format!(
+            "\n{:<25} {:>8} {:>9} {:>8} {:>20.1} {:>18.1} % {:>12.1} %",
+            cost.lidar,
+            cost.parser_bytes,
+            cost.packet_bytes,
+            cost.stack_bytes,
+            cost.instructions_per_byte,
+            cost.share(48.0),
+            cost.full_line_share(48.0),
+        );
+    }
+    for (lidar, mhz, core, bar) in PROMISES {
+        if let Some(cost) = costs.iter().find(|cost| cost.lidar == lidar) {
+            let share = cost.full_line_share(mhz);
+            text += &format!(
+                "\n{lidar} on a full line at {} baud: {share:.1} % of a {core} at {mhz} MHz in instructions, \
+                 {:.1} % in cycles at 1.5 a piece (at most {bar} %)",
+                cost.baud,
+                share * 1.5
+            );
+        }
+    }
+    text
+}
+
+/// Whose full line may take at most so many percent of which core: name, MHz, core, percent.
+pub const PROMISES: [(&str, f64, &str, f64); 2] = [
+    ("ld06", 48.0, "Cortex-M0", 5.0),
+    ("rplidar-dense", 133.0, "Cortex-M0+", 15.0),
+];
 
 /// Half a second of a sensor's bytes, and how many it sends a second.
 fn stream(model: &Model) -> (Vec<u8>, f64) {
@@ -61,13 +132,12 @@ impl WithParser for Checksum<'_> {
 }
 
 /// Runs the driver of `model` on `board`; fails where its beams differ from those found here.
-pub fn measure(board: &Board, model: &Model) -> Result<Cost> {
-    let elf = board.build("drivers")?;
+fn measure(board: &Board, elf: &Path, model: &'static Model) -> Result<Cost> {
     let (line, bytes_per_s) = stream(model);
     let place = Model::ALL.iter().position(|other| other.name == model.name);
     let mut input = vec![place.unwrap_or(0) as u8];
     input.extend(&line);
-    let output = emulator::run(board, &elf, &input, Count::Exact)?;
+    let output = emulator::run(board, elf, &input, Count::Exact)?;
     let (words, _) = output.as_chunks::<4>();
     let numbers: Vec<u32> = words.iter().map(|word| u32::from_le_bytes(*word)).collect();
     ensure!(
@@ -85,7 +155,9 @@ pub fn measure(board: &Board, model: &Model) -> Result<Cost> {
         here.0
     );
     Ok(Cost {
-        per_byte: f64::from(numbers[2]) / line.len() as f64,
+        lidar: model.name,
+        baud: model.baud,
+        instructions_per_byte: f64::from(numbers[2]) / line.len() as f64,
         parser_bytes: numbers[4],
         packet_bytes: numbers[5],
         stack_bytes: numbers[6],
