@@ -22,6 +22,10 @@
 //! | [`scip`] | URG-04LX and other SCIP 2.0 | recordings of an URG-04LX |
 //! | [`sick`] | LMS200, LMS291 | documented telegrams, generated scans |
 //!
+//! Not supported: Roborock's LDS01RR with the header `E7 7E` (its one description leaves open where the fields lie;
+//! units with the XV-11's frames are [`Model::LDS02RR`]), Delta-3A, YDLIDAR R3. The four-byte samples of the YDLIDAR
+//! T-mini Plus SH follow the maker's software and were never seen on a line.
+//!
 //! Which way the angles of LDS02RR and COIN-D4 grow, and where the zero of many sensors looks, no source proves: try it on
 //! the unit, and copy the [`Model`] with `counter_clockwise` and `zero_cdeg` as found.
 

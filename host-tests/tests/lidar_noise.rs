@@ -93,6 +93,40 @@ fn ld19_keeps_every_frame_that_400_faults_leave() {
     );
 }
 
+/// A lost zero frame does not make one turn of two.
+#[test]
+fn ydlidar_turns_begin_without_their_zero_frames() {
+    for model in [Model::X4, Model::TMINI] {
+        let clean = stream(&mut *encoder::for_model(&model), 20_000);
+        let Family::Ydlidar(samples) = model.family else {
+            panic!("not a YDLIDAR");
+        };
+        let zero_frame = 10 + usize::from(samples.bytes);
+        let is_zero = |at: usize| {
+            clean[at..].starts_with(&[0xaa, 0x55])
+                && clean
+                    .get(at + 2..at + 4)
+                    .is_some_and(|b| b[0] & 1 == 1 && b[1] == 1)
+        };
+        let zeros: Vec<usize> = (0..clean.len() - zero_frame)
+            .filter(|&at| is_zero(at))
+            .collect();
+        let turns = |bytes: &[u8]| {
+            let mut parser = ydlidar::Parser::for_model(&model);
+            bytes.iter().for_each(|&byte| drop(parser.push(byte)));
+            parser.counters().turns as usize
+        };
+        assert_eq!(turns(&clean), zeros.len(), "{}", model.name);
+        for lost in [&zeros[5..6], &zeros[4..8]] {
+            let mut line = clean.clone();
+            for &at in lost {
+                line[at + 5] ^= 0x10;
+            }
+            assert_eq!(turns(&line), zeros.len(), "{} without {lost:?}", model.name);
+        }
+    }
+}
+
 #[test]
 fn random_bytes_give_no_frames() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);

@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use beamfix::lidar::rplidar::command;
+use beamfix::lidar::scip::command::{Parameters, Part, Replies};
 use beamfix::lidar::{Family, Model, Packet, Protocol, delta, ld06, sick, ydlidar};
 use host_tests::decode::{self, WithParser, with_parser};
 use host_tests::encoder;
@@ -291,7 +292,38 @@ fn scip() {
         let id = vector["id"].as_str().expect("id");
         let expect = &vector["expect"];
         match id {
-            "doc-encoding" | "doc-pp" => continue,
+            "doc-encoding" => continue,
+            "doc-pp" => {
+                let mut parameters = Parameters::default();
+                let mut replies = Replies::new();
+                for byte in bytes(&vector) {
+                    match replies.push(byte) {
+                        Some(Part::Field { name, value }) => parameters.take(name, value),
+                        Some(Part::Damaged) => panic!("{id}: damaged"),
+                        _ => {}
+                    }
+                }
+                let Parameters {
+                    nearest_mm,
+                    farthest_mm,
+                    per_turn,
+                    first,
+                    last,
+                    front,
+                    rpm,
+                } = parameters;
+                for (name, value) in [
+                    ("DMIN", nearest_mm),
+                    ("DMAX", farthest_mm),
+                    ("ARES", per_turn),
+                    ("AMIN", first),
+                    ("AMAX", last),
+                    ("AFRT", front),
+                    ("SCAN_rpm", rpm),
+                ] {
+                    assert_eq!(Some(u64::from(value)), expect[name].as_u64(), "{name}");
+                }
+            }
             "constructed-md" => {
                 let found = decoded(&Model::URG04LX, &bytes(&vector));
                 let replies = expect["replies"].as_array().expect("replies");

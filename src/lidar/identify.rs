@@ -65,10 +65,11 @@ pub struct Finding {
 }
 
 /// Families that frames tell apart, each by a model that stands for it.
-const CANDIDATES: [&Model; 16] = [
+const CANDIDATES: [&Model; 17] = [
     &Model::LD06,
     &Model::X4,
     &Model::TMINI,
+    &Model::TMINI_SH,
     &Model::COIN_D4,
     &Model::LDS01,
     &Model::XV11,

@@ -25,6 +25,11 @@ pub const FRAME: usize = 47;
 /// Points of a frame.
 pub const POINTS: usize = 12;
 
+/// Starts the LD14P's motor and stream.
+pub const START: [u8; 8] = [0x54, 0xa0, 0x04, 0, 0, 0, 0, 0x5e];
+/// Stops them.
+pub const STOP: [u8; 8] = [0x54, 0xa1, 0x04, 0, 0, 0, 0, 0x4a];
+
 const STAMP_WRAP_MS: u16 = 30_000;
 const CRC: Crc<u8> = Crc::<u8>::new(&Algorithm {
     width: 8,

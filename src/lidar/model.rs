@@ -293,6 +293,12 @@ impl Model {
         farthest_mm: 12_000,
         ..Self::G2
     };
+    /// YDLIDAR T-mini Plus SH: four bytes a sample; not verified on a unit.
+    pub const TMINI_SH: Self = Self {
+        name: "ydlidar-tmini-sh",
+        family: Family::Ydlidar(ydlidar::Samples::TMINI_SH),
+        ..Self::TMINI
+    };
     /// YDLIDAR TG15, TG30, TG50: time of flight.
     pub const TG: Self = Self {
         name: "ydlidar-tg",
@@ -452,6 +458,7 @@ impl Model {
         Self::G4,
         Self::G6,
         Self::TMINI,
+        Self::TMINI_SH,
         Self::TG,
         Self::LDS01,
         Self::XV11,

@@ -13,6 +13,8 @@
 //! A character less `0x30` is six bits. MD and GD give three characters a value, MS and GS two. A check character is
 //! the low six bits of the line's sum plus `0x30`. A scan with a damaged line is refused as a whole.
 
+pub mod command;
+
 use heapless::Vec;
 
 use super::packet::divided;

@@ -27,6 +27,8 @@ pub const MOST_VALUES: usize = 401;
 pub const START: [u8; 2] = [0x20, 0x24];
 /// Payload that stops it.
 pub const STOP: [u8; 2] = [0x20, 0x25];
+/// Answer to the payloads that begin with `0x20`.
+pub const MODE_ANSWER: u8 = 0xa0;
 /// Payload that asks for the status.
 pub const STATUS: [u8; 1] = [0x31];
 /// Payload that sets 38 400 baud.

@@ -6,7 +6,10 @@
 //!
 //! ```text
 //! stop ─▶ drain ─▶ info ─▶ health ─▶ motor ─▶ spin-up ─▶ best mode ─▶ scan ─▶ ready ─▶ stalled?
+//! line's speed ─▶ motor ─▶ …                                                (SCIP, SICK)
 //! ```
+
+mod line;
 
 use core::fmt;
 
@@ -14,9 +17,11 @@ use heapless::Vec;
 
 use super::rplidar::command::{
     self, Answer, Answers, CONF_ANSWER, CONF_PERIOD, CONF_TYPICAL, EXPRESS_SCAN, GET_CONF,
-    GET_HEALTH, GET_INFO, Health, Info, LONGEST_REQUEST, RESET, SCAN, STOP,
+    GET_HEALTH, GET_INFO, Health, Info, LONGEST_REQUEST, MOTOR_PWM, RESET, SCAN, STOP,
 };
-use super::{coin_d4, lds01, sick};
+use super::scip::command::{Parameters, measure};
+use super::{Family, Model, coin_d4, ld06, lds01, model::Motor, sick};
+use line::{Line, Tongue};
 
 /// Whose language the sensor speaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,12 +38,44 @@ pub enum Dialect {
     CoinD4,
     /// LD14P: eight bytes.
     Ld14p,
-    /// SICK LMS2xx: a telegram.
-    Sick,
-    /// Hokuyo with SCIP 2.0: an endless MD command for the whole view of an URG-04LX.
-    Scip,
+    /// SICK LMS2xx, to be brought to a line of so many bits/s: 9600 (as it starts), 38 400 or 500 000.
+    Sick {
+        /// Speed of the line (bits/s).
+        baud: u32,
+    },
+    /// Hokuyo with SCIP 2.0, to be brought to a line of so many bits/s; it starts at 19 200.
+    Scip {
+        /// Speed of the line (bits/s).
+        baud: u32,
+    },
     /// Sends as soon as it turns: LD06, X2, XV-11, Delta, Camsense.
     Listen,
+}
+
+impl Dialect {
+    /// What a model speaks, at the speed that its row names.
+    #[must_use]
+    pub const fn of(model: &Model) -> Self {
+        let baud = model.baud;
+        match (model.family, model.motor) {
+            (
+                Family::RplidarScan
+                | Family::RplidarExpress
+                | Family::RplidarDense
+                | Family::RplidarUltra
+                | Family::RplidarUltraDense
+                | Family::RplidarHq,
+                _,
+            ) => Self::Rplidar,
+            (Family::Ydlidar(_), _) => Self::Ydlidar,
+            (Family::Lds01, _) => Self::Lds01,
+            (Family::CoinD4, _) => Self::CoinD4,
+            (Family::Ldrobot(_), Motor::Commands) => Self::Ld14p,
+            (Family::Sick, _) => Self::Sick { baud },
+            (Family::Scip(_), _) => Self::Scip { baud },
+            _ => Self::Listen,
+        }
+    }
 }
 
 /// What to do next.
@@ -46,6 +83,8 @@ pub enum Dialect {
 pub enum Action {
     /// Send these bytes.
     Send(Vec<u8, 24>),
+    /// Set the UART to so many bits a second, once all that was to be sent has left it.
+    SetBaud(u32),
     /// Switch the motor on, where the host does that.
     MotorOn,
     /// Nothing; ask again soon.
@@ -138,14 +177,20 @@ impl Default for StartConfig {
     }
 }
 
+/// Duty of an A2's or A3's motor that the maker's software starts with, of 1023.
+const MOTOR_PWM_USUAL: u16 = 660;
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Step {
+    /// The line is brought to its speed.
+    Line,
     Stop,
     Drain,
     Info,
     Health,
     Reset,
     Motor,
+    MotorSpeed,
     SpinUp,
     TypicalMode,
     AnswerType,
@@ -155,13 +200,14 @@ enum Step {
     Failed(StartError),
 }
 
-/// The state machine. About 150 bytes.
+/// The state machine. About 400 bytes.
 #[derive(Debug, Clone)]
 pub struct Startup {
     dialect: Dialect,
     config: StartConfig,
     step: Step,
     answers: Answers,
+    line: Line,
     info: Option<Info>,
     health: Option<Health>,
     /// When the present step began to wait; `None` before it has acted.
@@ -181,9 +227,15 @@ impl Startup {
             config,
             step: match dialect {
                 Dialect::Rplidar | Dialect::Ydlidar => Step::Stop,
+                Dialect::Sick { .. } | Dialect::Scip { .. } => Step::Line,
                 _ => Step::Motor,
             },
             answers: Answers::new(),
+            line: match dialect {
+                Dialect::Sick { baud } => Line::new(Tongue::Sick, baud),
+                Dialect::Scip { baud } => Line::new(Tongue::Scip, baud),
+                _ => Line::new(Tongue::Scip, 0),
+            },
             info: None,
             health: None,
             since_us: None,
@@ -203,11 +255,25 @@ impl Startup {
         self.info
     }
 
+    /// What a SCIP sensor measures, if it told: [`Parameters::steps`] are what its parser needs.
+    #[must_use]
+    pub fn parameters(&self) -> Option<Parameters> {
+        self.line.parameters.steps().map(|_| self.line.parameters)
+    }
+
     /// What is to be done now (µs, wrapping).
     pub fn poll(&mut self, now_us: u32) -> Action {
         let waited_ms = self.since_us.map(|since| now_us.wrapping_sub(since) / 1000);
         match (self.step, waited_ms) {
             (Step::Failed(error), _) => Action::Failed(error),
+            (Step::Line, _) => match self.line.poll(now_us, &self.config) {
+                Some(Action::Failed(error)) => self.fail(error),
+                Some(action) => action,
+                None => {
+                    self.go(Step::Motor);
+                    Action::Wait
+                }
+            },
             (Step::Streaming, None) => {
                 self.since_us = Some(now_us);
                 Action::Ready(self.mode)
@@ -221,7 +287,7 @@ impl Startup {
                 self.since_us = Some(now_us);
                 match self.dialect {
                     // The first two bytes wake it up.
-                    Dialect::Ydlidar => send(&[0xa5, 0x00, 0xa5, 0x65]),
+                    Dialect::Ydlidar => send(&[&[0xa5, 0x00, 0xa5, 0x65]]),
                     _ => self.request(STOP, &[]),
                 }
             }
@@ -239,9 +305,19 @@ impl Startup {
                 Action::Wait
             }
             (Step::Motor, _) => {
+                self.go(Step::MotorSpeed);
+                Action::MotorOn
+            }
+            (Step::MotorSpeed, _) => {
                 self.go(Step::SpinUp);
                 self.since_us = Some(now_us);
-                Action::MotorOn
+                // The A2's and A3's motor has a board of its own; C and S sensors start theirs with the scan.
+                match self.info.filter(|_| self.dialect == Dialect::Rplidar) {
+                    Some(info) if (0x20..0x40).contains(&info.model) => {
+                        self.request(MOTOR_PWM, &MOTOR_PWM_USUAL.to_le_bytes())
+                    }
+                    _ => Action::Wait,
+                }
             }
             (Step::SpinUp, Some(waited)) if waited >= self.config.spin_up_ms => {
                 // GET_CONF came with firmware 1.24.
@@ -283,7 +359,9 @@ impl Startup {
 
     /// Takes a byte from the sensor.
     pub fn push(&mut self, byte: u8) {
-        if let Some(answer) = self.answers.push(byte) {
+        if self.step == Step::Line {
+            self.line.push(byte);
+        } else if let Some(answer) = self.answers.push(byte) {
             self.take(&answer);
         }
     }
@@ -368,39 +446,29 @@ impl Startup {
     }
 
     fn start_scan(&mut self, command: u8, mode: u8) -> Action {
-        let start: &[u8] = match self.dialect {
+        let start = match self.dialect {
             Dialect::Rplidar if command == EXPRESS_SCAN => {
                 return self.request(command, &[mode, 0, 0, 0, 0]);
             }
             Dialect::Rplidar | Dialect::Ydlidar => return self.request(command, &[]),
-            Dialect::Lds01 => &[lds01::START],
-            Dialect::CoinD4 => &coin_d4::START,
-            Dialect::Ld14p => &[0x54, 0xa0, 0x04, 0, 0, 0, 0, 0x5e],
-            Dialect::Sick => &[
-                0x02,
-                0x00,
-                0x02,
-                0x00,
-                sick::START[0],
-                sick::START[1],
-                0x34,
-                0x08,
-            ],
-            Dialect::Scip => b"MD0044072501000\n",
-            Dialect::Listen => &[],
+            Dialect::Lds01 => send(&[&[lds01::START]]),
+            Dialect::CoinD4 => send(&[&coin_d4::START]),
+            Dialect::Ld14p => send(&[&ld06::START]),
+            Dialect::Sick { .. } => line::telegram(&sick::START),
+            Dialect::Scip { .. } => {
+                let Parameters { first, last, .. } = self.line.parameters;
+                send(&[&measure(first, last)])
+            }
+            Dialect::Listen => Action::Wait,
         };
         // Nobody announces these streams: their packets are the answer.
         self.go(Step::Streaming);
-        if start.is_empty() {
-            Action::Wait
-        } else {
-            send(start)
-        }
+        start
     }
 
     fn request(&mut self, command: u8, payload: &[u8]) -> Action {
         let bytes: Option<Vec<u8, LONGEST_REQUEST>> = command::request(command, payload);
-        send(&bytes.unwrap_or_default())
+        send(&[&bytes.unwrap_or_default()])
     }
 
     fn take(&mut self, answer: &Answer) {
@@ -458,8 +526,14 @@ impl Startup {
     }
 }
 
-fn send(bytes: &[u8]) -> Action {
-    Action::Send(Vec::from_slice(bytes).unwrap_or_default())
+/// Sends these one after the other.
+fn send(pieces: &[&[u8]]) -> Action {
+    let mut bytes = Vec::new();
+    for piece in pieces {
+        // Every request that is encoded here has room.
+        let _ = bytes.extend_from_slice(piece);
+    }
+    Action::Send(bytes)
 }
 
 #[cfg(test)]
@@ -481,7 +555,7 @@ mod tests {
                     }
                 }
                 Action::MotorOn => motor = true,
-                Action::Wait => {}
+                Action::Wait | Action::SetBaud(_) => {}
                 end => return (end, motor),
             }
         }
@@ -585,7 +659,7 @@ mod tests {
         for (dialect, expected) in [
             (Dialect::Lds01, &b"b"[..]),
             (Dialect::Ld14p, &[0x54, 0xa0, 4, 0, 0, 0, 0, 0x5e]),
-            (Dialect::Sick, &[2, 0, 2, 0, 0x20, 0x24, 0x34, 8]),
+            (Dialect::CoinD4, &[0xaa, 0x55, 0xf0, 0x0f]),
         ] {
             let mut startup = Startup::new(dialect, StartConfig::DEFAULT);
             let mut sent = Vec::<u8, 24>::new();
