@@ -113,7 +113,9 @@ fn ydlidar_turns_begin_without_their_zero_frames() {
             .collect();
         let turns = |bytes: &[u8]| {
             let mut parser = ydlidar::Parser::for_model(&model);
-            bytes.iter().for_each(|&byte| drop(parser.push(byte)));
+            for &byte in bytes {
+                parser.push(byte);
+            }
             parser.counters().turns as usize
         };
         assert_eq!(turns(&clean), zeros.len(), "{}", model.name);
