@@ -14,7 +14,10 @@ use std::{
 };
 
 use anyhow::{Context as _, Result, bail};
-use beamfix_app::telemetry::{Cost, Telemetry};
+use beamfix_app::{
+    App, BEAMS, CONFIG, SMALL_BEAMS,
+    telemetry::{Cost, Health, Reset, Telemetry},
+};
 
 use emulator::Count;
 use recording::Recording;
@@ -37,6 +40,8 @@ pub struct Board {
     ram_bytes: u64,
     /// Nanoseconds of emulated time per instruction: 2 to this.
     icount_shift: u8,
+    /// Most beams of a revolution.
+    pub beams: usize,
     /// Which of the machine's UARTs frames leave by and commands come in by; the lidar is on the first.
     uarts: &'static [Line],
 }
@@ -63,6 +68,7 @@ pub const BOARDS: &[Board] = &[
         ram_start: 0x2000_0000,
         ram_bytes: 4 << 20,
         icount_shift: 6,
+        beams: BEAMS,
         uarts: &[Line::Lidar, Line::Telemetry, Line::Commands],
     },
     Board {
@@ -75,6 +81,7 @@ pub const BOARDS: &[Board] = &[
         ram_start: 0x2000_0000,
         ram_bytes: 16 << 10,
         icount_shift: 6,
+        beams: SMALL_BEAMS,
         uarts: &[Line::LidarAndTelemetry],
     },
     Board {
@@ -87,6 +94,7 @@ pub const BOARDS: &[Board] = &[
         ram_start: 0x8040_0000,
         ram_bytes: 4 << 20,
         icount_shift: 0,
+        beams: BEAMS,
         uarts: &[Line::LidarAndTelemetry],
     },
 ];
@@ -153,10 +161,10 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Runs the application over a recording, here.
+    /// Runs the application over a recording, here, with room for so many beams: a board's [`Board::beams`].
     #[must_use]
-    pub fn on_host(recording: &Recording) -> Self {
-        let mut app = Box::new(new_app());
+    pub fn on_host(recording: &Recording, beams: usize) -> Self {
+        let mut app = Here::new(beams);
         let mut sent = app.ready().to_vec();
         for &byte in recording.bytes() {
             sent.extend_from_slice(app.command(byte));
@@ -233,8 +241,60 @@ fn bits(pose: &beamfix_app::telemetry::Pose) -> impl PartialEq + use<> {
     )
 }
 
-fn new_app() -> beamfix_app::Board {
-    beamfix_app::Board::new(beamfix_app::CONFIG)
+/// The application here, with as many beams as on one of the boards.
+pub enum Here {
+    /// As nearly all have it.
+    Usual(Box<App<BEAMS>>),
+    /// As a board with 16 KB of RAM has it.
+    Small(Box<App<SMALL_BEAMS>>),
+}
+
+impl Here {
+    /// With room for so many beams.
+    ///
+    /// # Panics
+    /// If no board has room for exactly so many.
+    #[must_use]
+    pub fn new(beams: usize) -> Self {
+        match beams {
+            BEAMS => Self::Usual(Box::new(App::new(CONFIG))),
+            SMALL_BEAMS => Self::Small(Box::new(App::new(CONFIG))),
+            _ => panic!("no board takes {beams} beams"),
+        }
+    }
+
+    /// As [`App::ready`].
+    pub fn ready(&mut self) -> &[u8] {
+        match self {
+            Self::Usual(app) => app.ready(Reset::Other),
+            Self::Small(app) => app.ready(Reset::Other),
+        }
+    }
+
+    /// As [`App::lidar`].
+    pub fn lidar(&mut self, byte: u8) -> &[u8] {
+        match self {
+            Self::Usual(app) => app.lidar(byte),
+            Self::Small(app) => app.lidar(byte),
+        }
+    }
+
+    /// As [`App::command`].
+    pub fn command(&mut self, byte: u8) -> &[u8] {
+        match self {
+            Self::Usual(app) => app.command(byte),
+            Self::Small(app) => app.command(byte),
+        }
+    }
+
+    /// As [`App::health`].
+    #[must_use]
+    pub fn health(&self) -> Health {
+        match self {
+            Self::Usual(app) => app.health(),
+            Self::Small(app) => app.health(),
+        }
+    }
 }
 
 fn root() -> &'static Path {

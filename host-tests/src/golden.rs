@@ -96,7 +96,7 @@ impl Golden {
     /// Poses by the library alone, as `replay` calls it.
     #[must_use]
     pub fn poses(&self) -> Vec<Pose> {
-        let mut pipeline = Pipeline::<{ beamfix_app::BEAMS }>::new(beamfix_app::CONFIG);
+        let mut pipeline = Pipeline::<{ beamfix_app::BEAMS }>::new(beamfix_app::CONFIG.odometry);
         self.scans
             .iter()
             .map(|scan| pipeline.step(&scan.beams, scan.wheels).pose)

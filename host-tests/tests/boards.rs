@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use beamfix_app::telemetry::Telemetry;
+use beamfix_app::{BEAMS, telemetry::Telemetry};
 use host_tests::{
     board::{BOARDS, Replay, difference, emulator::Count, recording::Recording, stream},
     encoder::{Echo, Encoder as _, ld06::Sensor},
@@ -35,9 +35,9 @@ fn square_room(turns: u32) -> Vec<u8> {
 fn every_board_replays_the_same_bits() {
     let mut recording = Recording::new();
     recording.lidar(&square_room(30));
-    let here = Replay::on_host(&recording);
-    assert!(here.poses().count() >= 27, "{}", here.poses().count());
     for board in BOARDS {
+        let here = Replay::on_host(&recording, board.beams);
+        assert!(here.poses().count() >= 27, "{}", here.poses().count());
         let there = board
             .replay(&recording, Count::None)
             .unwrap_or_else(|error| panic!("{error:#}"));
@@ -72,9 +72,9 @@ fn every_board_replays_a_real_log_to_the_same_bits() {
     }
     let log = readers::read(&log).unwrap_or_else(|error| panic!("{error:#}"));
     let recording = Recording::of_log(&log.scans[..1000]);
-    let here = Replay::on_host(&recording);
-    assert_eq!(here.poses().count(), 1000);
     for board in BOARDS {
+        let here = Replay::on_host(&recording, board.beams);
+        assert_eq!(here.poses().count(), 1000);
         let there = board
             .replay(&recording, Count::None)
             .unwrap_or_else(|error| panic!("{error:#}"));
@@ -116,7 +116,7 @@ fn a_damaged_line_costs_packets_not_the_run() {
     let mut recording = Recording::new();
     recording.lidar(&bytes);
     recording.ask_health();
-    let here = Replay::on_host(&recording);
+    let here = Replay::on_host(&recording, BEAMS);
     let poses: Vec<_> = here.poses().collect();
     // A frame of 47 bytes survives with a chance of 0.99^47 = 0.62; a turn whose start is lost joins the next.
     assert!(poses.len() > 80, "{} poses of 200", poses.len());
@@ -135,6 +135,7 @@ fn a_damaged_line_costs_packets_not_the_run() {
     );
     assert!(health.check_errors > 0 && health.skipped_bytes > 47 * (all - good) / 2);
     for board in BOARDS {
+        let here = Replay::on_host(&recording, board.beams);
         let there = board
             .replay(&recording, Count::None)
             .unwrap_or_else(|error| panic!("{error:#}"));

@@ -31,6 +31,13 @@ pub enum Command<'a> {
     },
     /// Asks for [`Health`](crate::telemetry::Health).
     Health,
+    /// Switches what is sent besides poses and health.
+    Send {
+        /// The lidar's bytes with their times.
+        raw: bool,
+        /// Every beam.
+        scans: bool,
+    },
 }
 
 /// A beam as it is sent: `u16` bearing, `u16` range (mm, 0 for none), `u32` time (µs), `u8` quality, little endian.

@@ -1,12 +1,21 @@
 //! What the firmware sends.
 
+use beamfix::{
+    lidar::{Packet as _, ld06},
+    scan::Bearing,
+};
+use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Most bytes of a framed [`Pose`].
 pub const POSE_FRAME: usize = 64;
+/// Most bytes of a framed [`Health`].
+pub const HEALTH_FRAME: usize = 56;
+/// Most bytes of a [`Raw`]: an LD06's packet.
+pub const RAW: usize = 47;
 
-/// A message from the board.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// A message from the board. How good a match was stands in its pose.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Telemetry {
     /// Sent once, when bytes are listened for.
     Ready(Ready),
@@ -16,6 +25,12 @@ pub enum Telemetry {
     Health(Health),
     /// What the last pose cost: only from a board that counts instructions.
     Cost(Cost),
+    /// Bytes of the lidar, where they are asked for.
+    Raw(Raw),
+    /// Beams of a packet, where they are asked for.
+    Scan(Piece),
+    /// Where the robot really is: only from a board that simulates its lidar.
+    Truth(Truth),
 }
 
 /// The firmware listens.
@@ -25,6 +40,19 @@ pub struct Ready {
     pub version: u8,
     /// Most beams a revolution may have.
     pub beams: u16,
+    /// Why the board has started.
+    pub reset: Reset,
+}
+
+/// Why a board has started.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Reset {
+    /// It was switched on, or its supply broke down.
+    Power,
+    /// Nothing went on any more.
+    Watchdog,
+    /// By a pin, a debugger, or for a reason that the board cannot tell.
+    Other,
 }
 
 /// Where the robot is, and how well that is known.
@@ -92,8 +120,106 @@ pub struct Health {
     pub commands: u32,
     /// Command frames that were damaged.
     pub command_errors: u32,
-    /// Bytes that came while the ring was full.
+    /// Bytes that came while the ring or the UART was full.
     pub bytes_lost: u32,
+    /// What the lidar does.
+    pub lidar: LidarState,
+    /// What its motor does.
+    pub motor: MotorState,
+    /// Times that the motor was started again; stays at the most.
+    pub motor_restarts: u8,
+}
+
+/// What the lidar does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum LidarState {
+    /// Nobody watches over it.
+    #[default]
+    Unknown,
+    /// Nothing comes: unplugged, or without power.
+    Silent,
+    /// Bytes come, but no packet: another lidar, or a bad line.
+    Noise,
+    /// Packets come, but no revolutions.
+    Standing,
+    /// All is well.
+    Turning,
+}
+
+/// What the lidar's motor does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum MotorState {
+    /// It is not driven by the board.
+    #[default]
+    Free,
+    /// On its way to its speed.
+    SpinningUp,
+    /// At its speed.
+    Steady,
+    /// Switched off for a moment, because it did not turn.
+    Off,
+}
+
+/// Bytes of the lidar as they came in.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Raw {
+    /// When the first of them was taken from the UART's buffer (µs, the board's clock, wrapping).
+    pub time_us: u32,
+    /// What came.
+    pub bytes: Vec<u8, RAW>,
+}
+
+/// Beams of a packet, in equal steps.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Piece {
+    /// Which of them is the first of a revolution, if one is.
+    pub turn_start: Option<u8>,
+    /// Bearing of the first (1/65 536 turn, counter-clockwise).
+    pub first: u16,
+    /// Bearing of the last.
+    pub last: u16,
+    /// Ranges (mm), 0 for none.
+    pub ranges_mm: Vec<u16, { ld06::POINTS }>,
+}
+
+impl Piece {
+    /// What a packet holds.
+    #[must_use]
+    pub fn of(packet: &ld06::Packet, turn_start: Option<usize>) -> Self {
+        let mut piece = Self {
+            turn_start: turn_start.map(|k| k as u8),
+            first: 0,
+            last: 0,
+            ranges_mm: Vec::new(),
+        };
+        for (k, beam) in packet.beams().enumerate() {
+            if k == 0 {
+                piece.first = beam.bearing.0;
+            }
+            piece.last = beam.bearing.0;
+            let _ = piece.ranges_mm.push(beam.range.mm().unwrap_or(0));
+        }
+        piece
+    }
+
+    /// Bearing and range (mm, 0 for none) of each beam.
+    pub fn beams(&self) -> impl Iterator<Item = (Bearing, u16)> + '_ {
+        let span = i32::from(self.last.wrapping_sub(self.first) as i16);
+        let steps = (self.ranges_mm.len() as i32 - 1).max(1);
+        self.ranges_mm.iter().enumerate().map(move |(k, &mm)| {
+            let turned = span * k as i32 / steps;
+            (Bearing(self.first.wrapping_add(turned as u16)), mm)
+        })
+    }
+}
+
+/// Where a simulated robot really is.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Truth {
+    /// Of the pose that it belongs to.
+    pub sequence: u16,
+    /// Forward, left (m) and heading (rad) since the start.
+    pub pose: [f32; 3],
 }
 
 /// Executed instructions of the last revolution, from its completion to its pose, and the stack's peak.

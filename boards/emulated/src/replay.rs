@@ -2,7 +2,7 @@
 
 use beamfix_app::{
     App, link,
-    telemetry::{Cost, Telemetry},
+    telemetry::{Cost, Reset, Telemetry},
 };
 use heapless::Vec;
 use semihosting::{
@@ -21,7 +21,7 @@ pub fn run<const N: usize>(
 ) -> io::Result<()> {
     let mut input = File::open(INPUT)?;
     let mut output = File::create(OUTPUT)?;
-    output.write_all(app.ready())?;
+    output.write_all(app.ready(Reset::Other))?;
     let mut chunk = [0; 32];
     loop {
         let n = input.read(&mut chunk)?;

@@ -1,11 +1,18 @@
-//! LD06 bytes in at PA10, frames out and commands in over the ST-Link's USB; poses on the probe's log too.
+//! LD06 bytes in at PA10, frames out and commands in over the ST-Link's USB, the motor's PWM at PB6; poses on the probe's
+//! log too.
 #![no_std]
 #![no_main]
 
 use core::cell::RefCell;
 
-use beamfix_app::{Board, CONFIG, ring::Ring};
-use cortex_m_rt::entry;
+use beamfix::geometry::Pose;
+use beamfix_app::{
+    AppConfig, CONFIG, LIDAR_BAUD, TELEMETRY_BAUD,
+    ring::Ring,
+    run::{Hardware, TICK_US, run},
+    telemetry::Reset,
+};
+use cortex_m_rt::{entry, exception};
 use critical_section::Mutex;
 use defmt_rtt as _;
 use embedded_hal_nb::{nb, serial::Read};
@@ -15,35 +22,77 @@ use stm32f4xx_hal::{
     pac::{self, interrupt},
     prelude::*,
     rcc::Config,
-    serial::{self, Rx},
+    serial::{self, Rx, Tx},
+    timer::Counter,
     watchdog::IndependentWatchdog,
 };
 
-/// An LD06 sends at 230 400 baud, and nothing speaks against the same for the rest.
-const BAUD: u32 = 230_400;
-
 static LIDAR_UART: Mutex<RefCell<Option<Rx<pac::USART1>>>> = Mutex::new(RefCell::new(None));
 static COMMAND_UART: Mutex<RefCell<Option<Rx<pac::USART2>>>> = Mutex::new(RefCell::new(None));
+/// What arrives while a match is computed: 178 ms of an LD06.
 static LIDAR: Ring<4096> = Ring::new();
 static COMMANDS: Ring<1024> = Ring::new();
 
+struct Board {
+    telemetry: Tx<pac::USART2>,
+    clock: Counter<pac::TIM2, 1_000_000>,
+    watchdog: IndependentWatchdog,
+    reset: Reset,
+}
+
+impl Hardware for Board {
+    fn reset(&mut self) -> Reset {
+        self.reset
+    }
+
+    fn now_us(&mut self) -> u32 {
+        self.clock.now().ticks()
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        let _ = self.telemetry.write_all(bytes);
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.feed();
+    }
+
+    fn wait(&mut self) {
+        cortex_m::asm::wfi();
+    }
+
+    fn log(&mut self, pose: Pose) {
+        defmt::info!("x {} m, y {} m, heading {} rad", pose.x, pose.y, pose.theta);
+    }
+}
+
+/// As this crate's features want it.
+const HERE: AppConfig = CONFIG.for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"));
+
 #[entry]
 fn main() -> ! {
-    static mut APP: Board = Board::new(CONFIG);
+    static mut APP: beamfix_app::Board = beamfix_app::Board::new(HERE);
 
     let p = pac::Peripherals::take().expect("the first to take them");
-    // The fastest that USB's clock allows too.
-    let mut rcc = p.RCC.freeze(Config::hsi().sysclk(168.MHz()));
+    let mut core = cortex_m::Peripherals::take().expect("the first to take them");
+    let reset = reset(&p.RCC);
+    // The fastest that USB's clock allows too. QEMU has no PLL to wait for.
+    let clocks = match cfg!(feature = "qemu") {
+        true => Config::hsi(),
+        false => Config::hsi().sysclk(168.MHz()),
+    };
+    let mut rcc = p.RCC.freeze(clocks);
     let gpioa = p.GPIOA.split(&mut rcc);
-    let config = || serial::config::Config::default().baudrate(BAUD.bps());
+    let gpiob = p.GPIOB.split(&mut rcc);
+    let config = |baud: u32| serial::config::Config::default().baudrate(baud.bps());
 
     let mut lidar: Rx<_> = p
         .USART1
-        .rx(gpioa.pa10, config(), &mut rcc)
+        .rx(gpioa.pa10, config(LIDAR_BAUD), &mut rcc)
         .expect("a possible baud rate");
-    let (mut telemetry, mut commands) = p
+    let (telemetry, mut commands) = p
         .USART2
-        .serial::<u8>((gpioa.pa2, gpioa.pa3), config(), &mut rcc)
+        .serial::<u8>((gpioa.pa2, gpioa.pa3), config(TELEMETRY_BAUD), &mut rcc)
         .expect("a possible baud rate")
         .split();
     lidar.listen();
@@ -57,29 +106,51 @@ fn main() -> ! {
         cortex_m::peripheral::NVIC::unmask(pac::Interrupt::USART1);
         cortex_m::peripheral::NVIC::unmask(pac::Interrupt::USART2);
     }
+    let mut clock = p.TIM2.counter_us(&mut rcc);
+    clock
+        .start(u32::MAX.micros())
+        .expect("a period that a timer of 32 bits has");
+    // An LD06 takes 20 to 50 kHz.
+    let (_, (motor, ..)) = p.TIM4.pwm_hz(30.kHz(), &mut rcc);
+    let mut motor = motor.with(gpiob.pb6);
+    motor.enable();
+    // Wakes the loop up in time for its look.
+    let ticks = rcc.clocks.sysclk().raw() / (1_000_000 / TICK_US) - 1;
+    core.SYST.set_reload(ticks.min(0x00ff_ffff));
+    core.SYST
+        .set_clock_source(cortex_m::peripheral::syst::SystClkSource::Core);
+    core.SYST.clear_current();
+    core.SYST.enable_interrupt();
+    core.SYST.enable_counter();
 
-    let _ = telemetry.write_all(APP.ready());
-    defmt::info!("beamfix listens for an LD06 at {} baud", BAUD);
-    // Fed by this loop, never by a timer: what hangs is started again. What waits for a lidar is not.
+    defmt::info!("beamfix listens for an LD06 at {} baud", LIDAR_BAUD);
     let mut watchdog = IndependentWatchdog::new(p.IWDG);
     watchdog.start(1.secs());
-    loop {
-        watchdog.feed();
-        let frames = if let Some(byte) = COMMANDS.pop() {
-            APP.command(byte)
-        } else if let Some(byte) = LIDAR.pop() {
-            APP.set_bytes_lost(LIDAR.lost());
-            APP.lidar(byte)
-        } else {
-            continue;
-        };
-        if !frames.is_empty() {
-            let _ = telemetry.write_all(frames);
-            let pose = APP.pose();
-            defmt::info!("x {} m, y {} m, heading {} rad", pose.x, pose.y, pose.theta);
-        }
+    let mut board = Board {
+        telemetry,
+        clock,
+        watchdog,
+        reset,
+    };
+    run(APP, &HERE, (&LIDAR, &COMMANDS), &mut board, motor)
+}
+
+/// Why the chip has started; forgets it, so that the next time tells itself.
+fn reset(rcc: &pac::RCC) -> Reset {
+    let cause = rcc.csr().read();
+    rcc.csr().modify(|_, w| w.rmvf().set_bit());
+    if cause.wdgrstf().bit_is_set() {
+        Reset::Watchdog
+    } else if cause.porrstf().bit_is_set() || cause.borrstf().bit_is_set() {
+        Reset::Power
+    } else {
+        Reset::Other
     }
 }
+
+/// Wakes the loop up: nothing else to do.
+#[exception]
+fn SysTick() {}
 
 #[interrupt]
 fn USART1() {

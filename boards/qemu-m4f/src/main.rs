@@ -2,38 +2,57 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::{Board, CONFIG, ring::Ring};
-use cortex_m::interrupt;
+use beamfix_app::{
+    AppConfig, Board, CONFIG,
+    ring::Ring,
+    run::{Hardware, NoPwm, run},
+};
+use beamfix_emulated::Machine as _;
 use cortex_m_rt::{entry, exception};
-use qemu_m4f::uart::Uart;
+use qemu_m4f::{clock::Timer, uart::Uart};
 
 static LIDAR: Ring<2048> = Ring::new();
 static COMMANDS: Ring<2048> = Ring::new();
 
+/// The machine's own time, which has nothing to do with the lidar's.
+#[derive(Default)]
+struct Mps2 {
+    /// Seen so far: 25 a microsecond.
+    ticks: u32,
+    us: u32,
+}
+
+impl Hardware for Mps2 {
+    fn now_us(&mut self) -> u32 {
+        let us = Timer.ticks().wrapping_sub(self.ticks) / 25;
+        self.ticks = self.ticks.wrapping_add(25 * us);
+        self.us = self.us.wrapping_add(us);
+        self.us
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        Uart::TELEMETRY.send(bytes);
+    }
+
+    fn feed_watchdog(&mut self) {}
+
+    fn wait(&mut self) {
+        cortex_m::asm::wfi();
+    }
+}
+
+/// As this crate's features want it.
+const HERE: AppConfig = CONFIG.for_features(false, cfg!(feature = "mavlink"));
+
 #[entry]
 fn main() -> ! {
-    static mut APP: Board = Board::new(CONFIG);
+    static mut APP: Board = Board::new(HERE);
 
     Uart::TELEMETRY.enable();
     Uart::LIDAR.enable();
     Uart::COMMANDS.enable();
-    Uart::TELEMETRY.send(APP.ready());
-    loop {
-        if let Some(byte) = COMMANDS.pop() {
-            Uart::TELEMETRY.send(APP.command(byte));
-        } else if let Some(byte) = LIDAR.pop() {
-            APP.set_bytes_lost(LIDAR.lost());
-            Uart::TELEMETRY.send(APP.lidar(byte));
-        } else {
-            // Looked at once more with interrupts masked: a byte that came just now would not wake the sleeper.
-            // A masked interrupt that is pending does.
-            interrupt::free(|_| {
-                if LIDAR.is_empty() && COMMANDS.is_empty() {
-                    cortex_m::asm::wfi();
-                }
-            });
-        }
-    }
+    Timer.restart();
+    run(APP, &HERE, (&LIDAR, &COMMANDS), &mut Mps2::default(), NoPwm)
 }
 
 /// Every interrupt; only the UARTs' are enabled.

@@ -2,7 +2,7 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::{Board, CONFIG};
+use beamfix_app::{Board, CONFIG, telemetry::Reset};
 use qemu_rv32::uart;
 
 #[riscv_rt::entry]
@@ -13,7 +13,7 @@ fn main() -> ! {
     let app = unsafe { &mut *app };
 
     uart::enable();
-    uart::send(app.ready());
+    uart::send(app.ready(Reset::Other));
     loop {
         if let Some(byte) = uart::received() {
             uart::send(app.lidar(byte));

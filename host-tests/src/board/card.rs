@@ -86,7 +86,7 @@ pub fn measure(board: &Board, recording: &Recording) -> Result<Card> {
     );
     Ok(Card {
         board: board.name.into(),
-        configuration: format!("LD06, odometry, {} beams", beamfix_app::BEAMS),
+        configuration: format!("LD06, odometry, {} beams", board.beams),
         flash_bytes,
         ram_bytes,
         stack_bytes: stack_bytes.into(),

@@ -1,0 +1,107 @@
+//! The main loop of every board with interrupts.
+
+use embedded_hal::pwm::{ErrorType, SetDutyCycle};
+
+use crate::{
+    App, AppConfig,
+    ring::Ring,
+    supervisor::{self, Supervisor},
+    telemetry::Reset,
+};
+
+/// What the loop needs of a board besides its interrupts, which fill the two rings.
+pub trait Hardware {
+    /// Why the board has started.
+    fn reset(&mut self) -> Reset {
+        Reset::Other
+    }
+
+    /// Time since the start (µs, wrapping).
+    fn now_us(&mut self) -> u32;
+
+    /// Sends bytes, waiting as long as it takes.
+    fn send(&mut self, bytes: &[u8]);
+
+    /// Keeps the board from being reset; called only while something goes on.
+    fn feed_watchdog(&mut self);
+
+    /// Sleeps until an interrupt is pending. Called with interrupts masked; must not unmask them.
+    fn wait(&mut self);
+
+    /// Something was sent; `pose` is where the robot is.
+    fn log(&mut self, pose: beamfix::geometry::Pose) {
+        let _ = pose;
+    }
+}
+
+/// Runs the application for ever.
+///
+/// The board must wake up by itself now and then (a timer's interrupt), or a silent lidar would look like a hang.
+pub fn run<const N: usize, const L: usize, const C: usize>(
+    app: &mut App<N>,
+    config: &AppConfig,
+    (lidar, commands): (&Ring<L>, &Ring<C>),
+    hardware: &mut impl Hardware,
+    pwm: impl SetDutyCycle,
+) -> ! {
+    let mut supervisor = Supervisor::new(pwm, config.motor, hardware.now_us());
+    let reset = hardware.reset();
+    hardware.send(app.ready(reset));
+    #[cfg(feature = "demo")]
+    let mut demo = crate::demo::Demo::new();
+    loop {
+        let now_us = hardware.now_us();
+        app.set_time(now_us);
+        #[cfg(feature = "demo")]
+        demo.advance(now_us, |byte| lidar.push(byte));
+        if supervisor.is_due(now_us) {
+            let care = supervisor.look(now_us, app.seen());
+            app.set_care(care);
+            if care.progress {
+                hardware.feed_watchdog();
+            }
+        }
+        let sent = if let Some(byte) = commands.pop() {
+            app.command(byte)
+        } else if let Some(byte) = lidar.pop() {
+            app.set_bytes_lost(lidar.lost());
+            app.lidar(byte)
+        } else {
+            // Looked at once more with interrupts masked: a byte that came just now would not wake the sleeper.
+            // A masked interrupt that is pending does.
+            critical_section::with(|_| {
+                if lidar.is_empty() && commands.is_empty() {
+                    hardware.wait();
+                }
+            });
+            continue;
+        };
+        if !sent.is_empty() {
+            hardware.send(sent);
+            hardware.log(app.pose());
+            #[cfg(feature = "demo")]
+            hardware.send(app.truth(&demo));
+        }
+    }
+}
+
+/// For a motor whose PWM line is not connected.
+#[derive(Debug, Clone, Copy)]
+pub struct NoPwm;
+
+impl ErrorType for NoPwm {
+    type Error = core::convert::Infallible;
+}
+
+impl SetDutyCycle for NoPwm {
+    fn max_duty_cycle(&self) -> u16 {
+        u16::MAX
+    }
+
+    fn set_duty_cycle(&mut self, _: u16) -> Result<(), Self::Error> {
+        Ok(())
+    }
+}
+
+/// How often the loop must come round for [`Supervisor`] (µs): let the timer wake the board so often.
+pub const TICK_US: u32 = supervisor::LOOK_US;

@@ -1,0 +1,82 @@
+//! The main loop of the boards with embassy: everything waits by `await`, over `embedded-io-async`.
+#![no_std]
+
+use beamfix_app::{
+    App, AppConfig, LIDAR_BAUD,
+    supervisor::{LOOK_US, Supervisor},
+    telemetry::Reset,
+};
+use embassy_futures::select::{Either, select};
+use embassy_time::{Duration, Instant, with_timeout};
+use embedded_hal::pwm::SetDutyCycle;
+use embedded_io_async::{Read, Write};
+
+/// The lines of a board.
+pub struct Lines<L, C, T> {
+    /// From the lidar; buffered, for bytes arrive while a match is computed.
+    pub lidar: L,
+    /// From whom it may concern.
+    pub commands: C,
+    /// To whom it may concern.
+    pub telemetry: T,
+}
+
+/// Runs the application for ever; `feed` keeps the board from being reset and is called only while something goes on.
+pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
+    app: &mut App<N>,
+    config: &AppConfig,
+    reset: Reset,
+    mut lines: Lines<L, C, T>,
+    pwm: impl SetDutyCycle,
+    mut feed: impl FnMut(),
+) -> ! {
+    let mut supervisor = Supervisor::new(pwm, config.motor, now_us());
+    let _ = lines.telemetry.write_all(app.ready(reset)).await;
+    defmt::info!("beamfix listens for an LD06 at {} baud", LIDAR_BAUD);
+    let mut overruns = 0u32;
+    loop {
+        let now_us = now_us();
+        app.set_time(now_us);
+        if supervisor.is_due(now_us) {
+            let care = supervisor.look(now_us, app.seen());
+            app.set_care(care);
+            if care.progress {
+                feed();
+            }
+        }
+        let (mut lidar_bytes, mut command_bytes) = ([0; 64], [0; 64]);
+        let read = select(
+            lines.lidar.read(&mut lidar_bytes),
+            lines.commands.read(&mut command_bytes),
+        );
+        let (bytes, is_lidar) = match with_timeout(SLEEP, read).await {
+            Ok(Either::First(Ok(n))) => (lidar_bytes.get(..n), true),
+            Ok(Either::Second(Ok(n))) => (command_bytes.get(..n), false),
+            // An error stands for at least one byte.
+            Ok(Either::First(Err(_))) => {
+                overruns = overruns.wrapping_add(1);
+                app.set_bytes_lost(overruns);
+                continue;
+            }
+            Ok(Either::Second(Err(_))) | Err(_) => continue,
+        };
+        for &byte in bytes.unwrap_or_default() {
+            let sent = match is_lidar {
+                true => app.lidar(byte),
+                false => app.command(byte),
+            };
+            if !sent.is_empty() {
+                let _ = lines.telemetry.write_all(sent).await;
+                let pose = app.pose();
+                defmt::info!("x {} m, y {} m, heading {} rad", pose.x, pose.y, pose.theta);
+            }
+        }
+    }
+}
+
+/// Longest sleep: so often the supervisor looks.
+const SLEEP: Duration = Duration::from_micros(LOOK_US as u64);
+
+fn now_us() -> u32 {
+    Instant::now().as_micros() as u32
+}

@@ -1,0 +1,213 @@
+//! LD06 bytes in at GPIO4, frames out at GPIO21 and commands in at GPIO20 (the board's USB bridge), the motor's PWM at
+//! GPIO6; poses on the probe's log too.
+#![no_std]
+#![no_main]
+
+use core::cell::RefCell;
+
+use beamfix::geometry::Pose;
+use beamfix_app::{
+    AppConfig, CONFIG, LIDAR_BAUD, TELEMETRY_BAUD,
+    ring::Ring,
+    run::{Hardware, TICK_US, run},
+    telemetry::Reset,
+};
+use critical_section::Mutex;
+use defmt_rtt as _;
+use embedded_io::Write as _;
+use esp_hal::{
+    Blocking,
+    gpio::DriveMode,
+    handler,
+    ledc::{
+        LSGlobalClkSource, Ledc, LowSpeed,
+        channel::{self, ChannelIFace as _},
+        timer::{self, TimerIFace as _},
+    },
+    main,
+    peripherals::{TIMG0, UART0},
+    rtc_cntl::{SocResetReason, reset_reason},
+    system::Cpu,
+    time::{Duration, Instant, Rate},
+    timer::{
+        PeriodicTimer,
+        systimer::SystemTimer,
+        timg::{MwdtStage, TimerGroup, Wdt},
+    },
+    uart::{Config, RxConfig, Uart, UartInterrupt, UartRx, UartTx},
+};
+use static_cell::StaticCell;
+
+esp_bootloader_esp_idf::esp_app_desc!();
+
+/// Nothing goes on for so long: reset.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// An interrupt for so many bytes of the 128 that the UART holds: 88 remain for what delays it, 3.8 ms of an LD06.
+const BYTES: u16 = 40;
+
+static LIDAR_UART: Mutex<RefCell<Option<Uart<'static, Blocking>>>> = Mutex::new(RefCell::new(None));
+static COMMAND_UART: Mutex<RefCell<Option<UartRx<'static, Blocking>>>> =
+    Mutex::new(RefCell::new(None));
+static TICK: Mutex<RefCell<Option<PeriodicTimer<'static, Blocking>>>> =
+    Mutex::new(RefCell::new(None));
+/// What arrives while a match is computed: 178 ms of an LD06.
+static LIDAR: Ring<4096> = Ring::new();
+static COMMANDS: Ring<1024> = Ring::new();
+
+struct Board {
+    telemetry: UartTx<'static, Blocking>,
+    watchdog: Wdt<TIMG0<'static>>,
+}
+
+impl Hardware for Board {
+    fn reset(&mut self) -> Reset {
+        match reset_reason(Cpu::ProCpu) {
+            Some(SocResetReason::ChipPowerOn | SocResetReason::SysBrownOut) => Reset::Power,
+            Some(SocResetReason::CoreMwdt0 | SocResetReason::Cpu0Mwdt0) => Reset::Watchdog,
+            _ => Reset::Other,
+        }
+    }
+
+    fn now_us(&mut self) -> u32 {
+        Instant::now().duration_since_epoch().as_micros() as u32
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        let _ = self.telemetry.write_all(bytes);
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.feed();
+    }
+
+    fn wait(&mut self) {
+        // SAFETY: an instruction that waits; a pending interrupt ends it though all are masked.
+        unsafe { core::arch::asm!("wfi") };
+    }
+
+    fn log(&mut self, pose: Pose) {
+        defmt::info!("x {} m, y {} m, heading {} rad", pose.x, pose.y, pose.theta);
+    }
+}
+
+/// As this crate's features want it.
+const HERE: AppConfig = CONFIG.for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"));
+
+#[main]
+fn main() -> ! {
+    static APP: StaticCell<beamfix_app::Board> = StaticCell::new();
+    let app = APP.init_with(|| beamfix_app::Board::new(HERE));
+
+    let config = esp_hal::Config::default().with_cpu_clock(esp_hal::clock::CpuClock::max());
+    let p = esp_hal::init(config);
+    let uart = |baud| {
+        let rx = RxConfig::default().with_fifo_full_threshold(BYTES);
+        Config::default().with_baudrate(baud).with_rx(rx)
+    };
+    let mut lidar = Uart::new(p.UART1, uart(LIDAR_BAUD))
+        .expect("a possible baud rate")
+        .with_rx(p.GPIO4);
+    let mut other = Uart::new(p.UART0, uart(TELEMETRY_BAUD))
+        .expect("a possible baud rate")
+        .with_rx(p.GPIO20)
+        .with_tx(p.GPIO21);
+    let events = UartInterrupt::RxFifoFull | UartInterrupt::RxTimeout;
+    lidar.set_interrupt_handler(lidar_bytes);
+    other.set_interrupt_handler(command_bytes);
+    let mut tick = PeriodicTimer::new(SystemTimer::new(p.SYSTIMER).alarm0);
+    tick.set_interrupt_handler(wake);
+    lidar.listen(events);
+    other.listen(events);
+    let (commands, telemetry) = other.split();
+    tick.listen();
+    tick.start(Duration::from_micros(TICK_US.into()))
+        .expect("a period that the timer has");
+    critical_section::with(|cs| {
+        LIDAR_UART.borrow_ref_mut(cs).replace(lidar);
+        COMMAND_UART.borrow_ref_mut(cs).replace(commands);
+        TICK.borrow_ref_mut(cs).replace(tick);
+    });
+
+    let mut ledc = Ledc::new(p.LEDC);
+    ledc.set_global_slow_clock(LSGlobalClkSource::APBClk);
+    let mut clock = ledc.timer::<LowSpeed>(timer::Number::Timer0);
+    // An LD06 takes 20 to 50 kHz.
+    clock
+        .configure(timer::config::Config {
+            duty: timer::config::Duty::Duty10Bit,
+            clock_source: timer::LSClockSource::APBClk,
+            frequency: Rate::from_khz(30),
+        })
+        .expect("a frequency that the timer has");
+    let mut motor = ledc.channel(channel::Number::Channel0, p.GPIO6);
+    motor
+        .configure(channel::config::Config {
+            timer: &clock,
+            duty_pct: 0,
+            drive_mode: DriveMode::PushPull,
+        })
+        .expect("a duty that the channel has");
+
+    defmt::info!("beamfix listens for an LD06 at {} baud", LIDAR_BAUD);
+    let mut watchdog = TimerGroup::new(p.TIMG0).wdt;
+    watchdog.set_timeout(MwdtStage::Stage0, PATIENCE);
+    watchdog.enable();
+    let mut board = Board {
+        telemetry,
+        watchdog,
+    };
+    run(app, &HERE, (&LIDAR, &COMMANDS), &mut board, motor)
+}
+
+/// Wakes the loop up: nothing else to do.
+#[handler]
+fn wake() {
+    critical_section::with(|cs| {
+        if let Some(tick) = TICK.borrow_ref_mut(cs).as_mut() {
+            tick.clear_interrupt();
+        }
+    });
+}
+
+#[handler]
+fn lidar_bytes() {
+    critical_section::with(|cs| {
+        if let Some(uart) = LIDAR_UART.borrow_ref_mut(cs).as_mut() {
+            drain(|bytes| uart.read_buffered(bytes), &LIDAR);
+            uart.clear_interrupts(UartInterrupt::RxFifoFull | UartInterrupt::RxTimeout);
+        }
+    });
+}
+
+#[handler]
+fn command_bytes() {
+    critical_section::with(|cs| {
+        if let Some(uart) = COMMAND_UART.borrow_ref_mut(cs).as_mut() {
+            drain(|bytes| uart.read_buffered(bytes), &COMMANDS);
+            // This half of a UART has no function for it.
+            UART0::regs().int_clr().write(|w| {
+                w.rxfifo_full().clear_bit_by_one();
+                w.rxfifo_tout().clear_bit_by_one()
+            });
+        }
+    });
+}
+
+/// Moves what the UART holds to the ring.
+fn drain<E, const B: usize>(mut read: impl FnMut(&mut [u8]) -> Result<usize, E>, ring: &Ring<B>) {
+    let mut bytes = [0; 32];
+    loop {
+        match read(&mut bytes) {
+            Ok(0) => return,
+            Ok(n) => bytes.iter().take(n).for_each(|&byte| ring.push(byte)),
+            // The driver then empties the UART: how many bytes that was, nobody knows.
+            Err(_) => ring.lose(1),
+        }
+    }
+}
+
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo) -> ! {
+    defmt::error!("{}", defmt::Display2Format(info));
+    esp_hal::system::software_reset()
+}
