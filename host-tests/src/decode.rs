@@ -8,7 +8,7 @@ use beamfix::lidar::{
 };
 use beamfix::scan::Beam;
 
-use crate::timed;
+use crate::timed::{self, Content};
 
 /// Names that [`decode`] knows.
 pub fn names() -> impl Iterator<Item = &'static str> {
@@ -32,6 +32,8 @@ pub struct Row {
     pub beam: Beam,
     /// Whether it is the first of a turn.
     pub turn_starts: bool,
+    /// Number of the recording's piece whose bytes completed it.
+    pub piece: usize,
 }
 
 /// What a whole stream held.
@@ -74,8 +76,12 @@ impl fmt::Display for DecodeError {
 
 impl std::error::Error for DecodeError {}
 
-/// The model called `name`; for `auto`, the one that `bytes` are most likely from.
+/// The model called `name`; for `auto`, the one that `bytes` name or are most likely from.
 pub fn model(name: &str, bytes: &[u8]) -> Result<&'static Model, DecodeError> {
+    let name = match name {
+        "auto" => timed::lidar(bytes).unwrap_or(name),
+        _ => name,
+    };
     if name != "auto" {
         return Model::named(name).ok_or_else(|| DecodeError::UnknownLidar(name.into()));
     }
@@ -150,18 +156,22 @@ impl WithParser for Decoding<'_> {
 
     fn run<P: Protocol>(self, mut parser: P) -> Summary {
         let mut summary = Summary::default();
-        for piece in timed::pieces(self.bytes) {
+        let pieces = timed::pieces(self.bytes);
+        for (k, piece) in pieces.iter().enumerate() {
+            let Content::Bytes(bytes) = piece.content else {
+                continue;
+            };
             if let Some(time_us) = piece.time_us {
                 parser.arrived(time_us as u32);
             }
-            for &byte in piece.bytes {
+            for &byte in bytes {
                 if let Some(packet) = parser.push(byte) {
-                    summary.take(&packet, self.is_signed, self.sink);
+                    summary.take(&packet, self.is_signed, k, self.sink);
                 }
             }
         }
         while let Some(packet) = parser.pull() {
-            summary.take(&packet, self.is_signed, self.sink);
+            summary.take(&packet, self.is_signed, pieces.len(), self.sink);
         }
         let Counters {
             packets,
@@ -180,7 +190,13 @@ impl WithParser for Decoding<'_> {
 }
 
 impl Summary {
-    fn take(&mut self, packet: &impl Packet, is_signed: bool, sink: &mut dyn FnMut(Row)) {
+    fn take(
+        &mut self,
+        packet: &impl Packet,
+        is_signed: bool,
+        piece: usize,
+        sink: &mut dyn FnMut(Row),
+    ) {
         for (k, (sample, beam)) in packet.samples().zip(packet.beams()).enumerate() {
             let turn_starts = packet.turn_start() == Some(k);
             self.scans += u32::from(turn_starts);
@@ -194,6 +210,7 @@ impl Summary {
                 quality: sample.quality,
                 beam,
                 turn_starts,
+                piece,
             });
         }
     }

@@ -17,6 +17,8 @@ use anyhow::{Result, bail};
 use beamfix::geometry::Pose;
 use beamfix::scan::Beam;
 
+use crate::timed;
+
 /// One scan of a log.
 #[derive(Debug, Clone)]
 pub struct Recorded {
@@ -71,10 +73,14 @@ impl Log {
     }
 }
 
-/// Reads a CARMEN text log, an `.lscan` file or a ROS 2 recording (MCAP), packed with gzip or not; the content tells which.
+/// Reads a CARMEN text log, an `.lscan` file, a ROS 2 recording (MCAP) or a recording of a lidar's bytes ([`timed`]),
+/// packed with gzip or not; the content tells which.
 pub fn read(path: &Path) -> Result<Log> {
     let content = bytes::load(path)?;
     let name = path.display();
+    if content.bytes.starts_with(timed::MAGIC) {
+        return capture::parse(&name.to_string(), content, "auto");
+    }
     let mut log = if content.bytes.starts_with(lscan::MAGIC) {
         lscan::parse(&content.bytes).map_err(|error| error.context(name.to_string()))?
     } else if content.bytes.starts_with(ros::MAGIC) {

@@ -1,21 +1,47 @@
-//! Raw bytes with the times at which they came in: recorded on the spot, replayed later with the same beam times.
+//! Recordings: a lidar's bytes with the times at which they came in, and where the wheels said the robot was.
 //!
-//! `BYTES+T1`, then pieces: `u64` time (µs), `u32` length, the bytes; all little-endian. A file without this start is
-//! bytes alone.
+//! Replayed, the drivers see bit for bit what they saw on the robot.
+//!
+//! | bytes | |
+//! | --- | --- |
+//! | 8 | `BYTES+T2` |
+//! | | then pieces: |
+//! | 8 | time (µs), `u64` |
+//! | 1 | what it is: 0 bytes of the lidar, 1 wheels, 2 name of the lidar, 3 the lidar's place on the robot |
+//! | 4 | length of the rest, `u32` |
+//! | … | bytes; x, y (m), heading (rad) as three `f32`; text; three `f32` again |
+//!
+//! All little-endian. Wheels count for the turn that the next bytes complete. Pieces of other kinds are skipped. A file
+//! without this start is bytes of the lidar alone.
 
 use std::borrow::Cow;
 use std::io::{self, Write};
 
-/// How such a file starts.
-pub const MAGIC: &[u8; 8] = b"BYTES+T1";
+use beamfix::geometry::Pose;
 
-/// Bytes that came in together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// How such a file starts.
+pub const MAGIC: &[u8; 8] = b"BYTES+T2";
+
+/// What came in together.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Piece<'a> {
     /// When (µs); `None` where nobody wrote it down.
     pub time_us: Option<u64>,
-    /// What came.
-    pub bytes: &'a [u8],
+    /// What.
+    pub content: Content<'a>,
+}
+
+/// What a piece holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Content<'a> {
+    /// Bytes of the lidar.
+    Bytes(&'a [u8]),
+    /// The robot's pose by its wheels, in a frame of their own.
+    Wheels(Pose),
+    /// Which lidar it is.
+    Lidar(&'a str),
+    /// The lidar's pose on the robot.
+    Mount(Pose),
 }
 
 /// Records pieces as they come in.
@@ -32,11 +58,22 @@ impl<W: Write> Recorder<W> {
     }
 
     /// Appends what came in at this time (µs).
-    pub fn push(&mut self, time_us: u64, bytes: &[u8]) -> io::Result<()> {
-        let length = u32::try_from(bytes.len()).map_err(io::Error::other)?;
+    pub fn push(&mut self, time_us: u64, content: Content) -> io::Result<()> {
+        let pose = |pose: Pose| {
+            let numbers = [pose.x, pose.y, pose.theta];
+            Cow::Owned(numbers.into_iter().flat_map(f32::to_le_bytes).collect())
+        };
+        let (kind, payload): (u8, Cow<[u8]>) = match content {
+            Content::Bytes(bytes) => (0, Cow::Borrowed(bytes)),
+            Content::Wheels(wheels) => (1, pose(wheels)),
+            Content::Lidar(name) => (2, Cow::Borrowed(name.as_bytes())),
+            Content::Mount(mount) => (3, pose(mount)),
+        };
+        let length = u32::try_from(payload.len()).map_err(io::Error::other)?;
         self.output.write_all(&time_us.to_le_bytes())?;
+        self.output.write_all(&[kind])?;
         self.output.write_all(&length.to_le_bytes())?;
-        self.output.write_all(bytes)
+        self.output.write_all(&payload)
     }
 
     /// Ends the recording.
@@ -46,42 +83,74 @@ impl<W: Write> Recorder<W> {
     }
 }
 
-/// The pieces of a file with or without times; a last one that was cut off is as long as it is.
+/// The pieces of a file; a last one that was cut off is as long as it is, or left out.
 #[must_use]
 pub fn pieces(file: &[u8]) -> Vec<Piece<'_>> {
     let Some(mut rest) = file.strip_prefix(MAGIC) else {
         return vec![Piece {
             time_us: None,
-            bytes: file,
+            content: Content::Bytes(file),
         }];
     };
     let mut pieces = Vec::new();
     while let Some((time, after)) = rest.split_first_chunk::<8>() {
-        let Some((length, after)) = after.split_first_chunk::<4>() else {
+        let Some((&[kind, l0, l1, l2, l3], after)) = after.split_first_chunk::<5>() else {
             break;
         };
-        let length = (u32::from_le_bytes(*length) as usize).min(after.len());
-        let (bytes, after) = after.split_at(length);
-        pieces.push(Piece {
-            time_us: Some(u64::from_le_bytes(*time)),
-            bytes,
-        });
+        let length = (u32::from_le_bytes([l0, l1, l2, l3]) as usize).min(after.len());
+        let (payload, after) = after.split_at(length);
         rest = after;
+        let content = match kind {
+            0 => Some(Content::Bytes(payload)),
+            1 => pose(payload).map(Content::Wheels),
+            2 => std::str::from_utf8(payload).ok().map(Content::Lidar),
+            3 => pose(payload).map(Content::Mount),
+            _ => None,
+        };
+        pieces.extend(content.map(|content| Piece {
+            time_us: Some(u64::from_le_bytes(*time)),
+            content,
+        }));
     }
     pieces
 }
 
-/// The bytes of a file with or without times.
+fn pose(payload: &[u8]) -> Option<Pose> {
+    let (numbers, _) = payload.as_chunks::<4>();
+    match *numbers {
+        [x, y, theta] => {
+            let [x, y, theta] = [x, y, theta].map(f32::from_le_bytes);
+            [x, y, theta]
+                .iter()
+                .all(|number| number.is_finite())
+                .then(|| Pose::new(x, y, theta))
+        }
+        _ => None,
+    }
+}
+
+/// The lidar's bytes of a file with or without times.
 #[must_use]
 pub fn plain(file: &[u8]) -> Cow<'_, [u8]> {
-    match pieces(file)[..] {
-        [Piece { bytes, .. }] => Cow::Borrowed(bytes),
-        ref pieces => pieces
-            .iter()
-            .flat_map(|piece| piece.bytes)
-            .copied()
-            .collect(),
+    if !file.starts_with(MAGIC) {
+        return Cow::Borrowed(file);
     }
+    let mut plain = Vec::new();
+    for piece in pieces(file) {
+        if let Content::Bytes(bytes) = piece.content {
+            plain.extend_from_slice(bytes);
+        }
+    }
+    Cow::Owned(plain)
+}
+
+/// Which lidar a recording names.
+#[must_use]
+pub fn lidar(file: &[u8]) -> Option<&str> {
+    pieces(file).iter().find_map(|piece| match piece.content {
+        Content::Lidar(name) => Some(name),
+        _ => None,
+    })
 }
 
 #[cfg(test)]
@@ -90,14 +159,26 @@ mod tests {
 
     #[test]
     fn what_is_recorded_comes_back() {
+        let contents = [
+            (0, Content::Lidar("xv11")),
+            (0, Content::Mount(Pose::new(0.1, -0.2, 3.0))),
+            (5, Content::Bytes(&[1, 2, 3])),
+            (1 << 40, Content::Bytes(&[])),
+            (7, Content::Wheels(Pose::new(1.5, f32::MIN_POSITIVE, -3.1))),
+            (9, Content::Bytes(&[4])),
+        ];
         let mut recorder = Recorder::new(Vec::new()).expect("memory");
-        recorder.push(5, &[1, 2, 3]).expect("memory");
-        recorder.push(1 << 40, &[]).expect("memory");
-        recorder.push(9, &[4]).expect("memory");
+        for (time_us, content) in contents {
+            recorder.push(time_us, content).expect("memory");
+        }
         let file = recorder.finish().expect("memory");
-        let times: Vec<_> = pieces(&file).iter().map(|piece| piece.time_us).collect();
-        assert_eq!(times, [Some(5), Some(1 << 40), Some(9)]);
+        let back: Vec<_> = pieces(&file)
+            .iter()
+            .map(|piece| (piece.time_us.expect("written"), piece.content))
+            .collect();
+        assert_eq!(back, contents);
         assert_eq!(plain(&file)[..], [1, 2, 3, 4]);
+        assert_eq!(lidar(&file), Some("xv11"));
         // Cut anywhere: what is left is a start of it.
         for end in 0..file.len() {
             let cut = plain(&file[..end]);

@@ -314,7 +314,7 @@ fn replayed_bytes_have_their_times() {
             };
             if !line.is_empty() && !(3000..4000).contains(&truth.len()) {
                 recorder
-                    .push((sent_us + late_us) as u64, &line)
+                    .push((sent_us + late_us) as u64, timed::Content::Bytes(&line))
                     .expect("memory");
             }
         }

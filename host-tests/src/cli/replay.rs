@@ -21,7 +21,8 @@ use super::localize::replay as localize_replay;
 use super::output;
 use super::track::{At, Track};
 
-/// Run the firmware's pipeline over a recorded log: CARMEN .log, .lscan, ROS 2 MCAP, or a raw serial capture; packed or not.
+/// Run the firmware's pipeline over a recorded log: CARMEN .log, .lscan, ROS 2 MCAP, a recording of
+/// `simulate` (lidar.rec), or a raw serial capture; packed or not.
 #[derive(clap::Args)]
 pub struct Args {
     /// The log.

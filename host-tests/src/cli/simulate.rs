@@ -7,9 +7,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use beamfix::geometry::Pose;
+use beamfix::lidar::Model;
 use beamfix::odometry::{Counters, OdometryConfig};
 use beamfix::scan::Mount;
-use beamfix::scan::bins::{Bins, Keep};
 use host_tests::decode::{self, Summary};
 use host_tests::picture;
 use host_tests::pipeline::Pipeline;
@@ -17,6 +17,7 @@ use host_tests::readers::capture::{self, Turn};
 use host_tests::recording::Recording;
 use host_tests::sim::lidar::Ranging;
 use host_tests::sim::{self, Drive, Settings};
+use host_tests::timed::{Content, Recorder};
 use host_tests::{encoder, size, sized};
 use serde_json::json;
 
@@ -26,7 +27,7 @@ use super::track::{At, Track};
 /// Drive a simulated robot through a flat: ray casting, lidar bytes, driver, matcher, pose.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Where to write map.png, errors.svg, trajectory.txt, truth.txt, run.mcap.
+    /// Where to write map.png, errors.svg, trajectory.txt, truth.txt, run.mcap, and lidar.rec for `replay`.
     #[arg(long, value_name = "DIR", default_value = "target/beamfix")]
     out: PathBuf,
     /// Seed of all randomness.
@@ -43,8 +44,8 @@ pub struct Args {
     json: bool,
 }
 
-/// Most beams of a turn that are matched; of a finer sensor's, one for each of so many directions.
-const MOST_BEAMS: usize = 1024;
+/// Pieces of a recording before the first bytes.
+const HEAD: usize = 2;
 /// Every so many scans are drawn.
 const DRAWN: usize = 4;
 
@@ -66,16 +67,39 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         ..Settings::DEFAULT
     };
     let drive = sim::drive(&settings, encoder::for_model(model).as_mut());
-    let (mut turns, summary) = capture::turns(&args.lidar, &drive.bytes)?;
-    for turn in &mut turns {
-        if turn.beams.len() > MOST_BEAMS {
-            let mut bins = Bins::new(MOST_BEAMS as u16, Keep::First);
-            let kept = turn.beams.iter().filter_map(|beam| bins.push(*beam, false));
-            turn.beams = kept.map(|(beam, _)| beam).collect();
-        }
-    }
+    let (turns, summary) = record(args, &settings, &drive, model)?;
     let size = size::fitting(turns.iter().map(|turn| &turn.beams[..]));
     sized!(size, follow(args, &settings, drive, &turns, &summary))
+}
+
+/// Records what came over the line, as a robot would, and decodes that; the recording gets the wheels as well.
+fn record(
+    args: &Args,
+    settings: &Settings,
+    drive: &Drive,
+    model: &Model,
+) -> Result<(Vec<Turn>, Summary)> {
+    let write = |turns: &[Turn]| -> Result<Vec<u8>> {
+        let mut recorder = Recorder::new(Vec::new())?;
+        recorder.push(0, Content::Lidar(model.name))?;
+        recorder.push(0, Content::Mount(settings.mount.into()))?;
+        let mut start = 0;
+        for (frame, &(end, measured_us)) in drive.frames.iter().enumerate() {
+            let on_line_us = (end - start) as f64 * 1e7 / f64::from(model.baud);
+            let time_us = (measured_us + on_line_us) as u64;
+            let turn = turns.iter().find(|turn| turn.piece == frame + HEAD);
+            if let Some(now) = turn.and_then(|turn| moment(drive, turn)) {
+                recorder.push(time_us, Content::Wheels(now.wheels.into()))?;
+            }
+            recorder.push(time_us, Content::Bytes(&drive.bytes[start..end]))?;
+            start = end;
+        }
+        Ok(recorder.finish()?)
+    };
+    let (turns, summary) = capture::turns(model.name, &write(&[])?)?;
+    let path = args.out.join("lidar.rec");
+    fs::write(&path, write(&turns)?).with_context(|| path.display().to_string())?;
+    Ok((turns, summary))
 }
 
 /// Follows the robot by what its lidar saw, with room for N beams a turn.
@@ -166,7 +190,7 @@ fn follow<const N: usize>(
     });
     let text = format!(
         "{caption}\nwheels alone: {:.1} cm, {:.2}° at the end\n{} bytes, {} packets, {} scans, {} refused, {} keyframes\n\
-         pose hash {}\nwritten to {}: map.png errors.svg trajectory.txt truth.txt run.mcap",
+         pose hash {}\nwritten to {}: map.png errors.svg trajectory.txt truth.txt run.mcap lidar.rec",
         100.0 * errors.wheels.0,
         errors.wheels.1,
         drive.bytes.len(),

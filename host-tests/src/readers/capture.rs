@@ -3,18 +3,28 @@
 use std::path::Path;
 
 use anyhow::{Result, ensure};
+use beamfix::geometry::Pose;
 use beamfix::scan::Beam;
+use beamfix::scan::bins::{Bins, Keep};
 
 use super::{Log, Recorded, bytes};
 use crate::decode::{self, Summary};
+use crate::timed::{self, Content};
+
+/// Most beams of a turn that are matched; of a finer sensor's, one for each of so many directions.
+pub const MOST_BEAMS: usize = 1024;
 
 /// One whole turn of a stream.
 #[derive(Debug, Clone)]
 pub struct Turn {
-    /// Its beams in order.
+    /// Its beams in order; of more than [`MOST_BEAMS`] one for each direction.
     pub beams: Vec<Beam>,
     /// Beams of the stream up to and with its last one.
     pub ends_at: usize,
+    /// Number of the recording's piece whose bytes completed it.
+    pub piece: usize,
+    /// Where the wheels said the robot was, if the recording tells.
+    pub wheels: Option<Pose>,
 }
 
 /// Decodes a stream of the sensor called `lidar` into whole turns; the parts of a turn at either end are left out.
@@ -26,8 +36,10 @@ pub fn turns(lidar: &str, stream: &[u8]) -> Result<(Vec<Turn>, Summary)> {
         if row.turn_starts {
             if let Some(beams) = present.take().filter(|beams| !beams.is_empty()) {
                 turns.push(Turn {
-                    beams,
+                    beams: thinned(beams),
                     ends_at: count,
+                    piece: row.piece,
+                    wheels: None,
                 });
             }
             present = Some(Vec::new());
@@ -37,13 +49,41 @@ pub fn turns(lidar: &str, stream: &[u8]) -> Result<(Vec<Turn>, Summary)> {
         }
         count += 1;
     })?;
+    let mut wheels = timed::pieces(stream)
+        .into_iter()
+        .enumerate()
+        .filter_map(|(k, piece)| match piece.content {
+            Content::Wheels(pose) => Some((k, pose)),
+            _ => None,
+        })
+        .peekable();
+    let mut last = None;
+    for turn in &mut turns {
+        while let Some((_, pose)) = wheels.next_if(|(k, _)| *k < turn.piece) {
+            last = Some(pose);
+        }
+        turn.wheels = last;
+    }
     Ok((turns, summary))
+}
+
+fn thinned(beams: Vec<Beam>) -> Vec<Beam> {
+    if beams.len() <= MOST_BEAMS {
+        return beams;
+    }
+    let mut bins = Bins::new(MOST_BEAMS as u16, Keep::First);
+    let kept = beams.iter().filter_map(|beam| bins.push(*beam, false));
+    kept.map(|(beam, _)| beam).collect()
 }
 
 /// Reads a capture as a log; the stamps are the sensor's clock at each turn's last beam.
 pub fn read(path: &Path, lidar: &str) -> Result<Log> {
     let content = bytes::load(path)?;
-    let name = path.display();
+    parse(&path.display().to_string(), content, lidar)
+}
+
+/// Reads a capture that was loaded already.
+pub(super) fn parse(name: &str, content: bytes::Content, lidar: &str) -> Result<Log> {
     let (turns, summary) = turns(lidar, &content.bytes)?;
     ensure!(
         summary.packets > 0,
@@ -57,8 +97,15 @@ pub fn read(path: &Path, lidar: &str) -> Result<Log> {
         summary.packets,
         summary.points
     );
+    let mount = timed::pieces(&content.bytes)
+        .into_iter()
+        .find_map(|piece| match piece.content {
+            Content::Mount(pose) => Some(pose),
+            _ => None,
+        });
     let mut log = Log {
         cut: content.cut,
+        robot_from_lidar: mount.unwrap_or(Pose::IDENTITY),
         ..Log::default()
     };
     if summary.check_errors > 0 {
@@ -74,7 +121,7 @@ pub fn read(path: &Path, lidar: &str) -> Result<Log> {
             let us = turn.beams.last().map_or(0, |beam| beam.time_us);
             Recorded {
                 stamp: format!("{}.{:06}", us / 1_000_000, us % 1_000_000),
-                wheels: None,
+                wheels: turn.wheels,
                 beams: turn.beams,
             }
         })

@@ -52,6 +52,8 @@ pub struct Drive {
     pub world: World,
     /// What came over the lidar's line.
     pub bytes: Vec<u8>,
+    /// Where in `bytes` each frame ends, and when (µs) what it tells was measured.
+    pub frames: Vec<(usize, f64)>,
     /// The robot at each beam, in order.
     pub moments: Vec<Moment>,
     /// Metres driven.
@@ -70,7 +72,7 @@ pub fn drive(settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
     let (start, way) = scenes::flat_round();
     let mut robot = Robot::new(start, way, settings.wheels, Noise::new(settings.seed, 1));
     let mut noise = Noise::new(settings.seed, 2);
-    let (mut bytes, mut moments) = (Vec::new(), Vec::new());
+    let (mut bytes, mut frames, mut moments) = (Vec::new(), Vec::new(), Vec::new());
     let mut clearance = f64::INFINITY;
     let mut now = 0.0;
     for period in 1.. {
@@ -101,7 +103,11 @@ pub fn drive(settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
                     intensity: quality(Some(range_mm)),
                 })
             };
+            let before = bytes.len();
             sensor.fire(&mut look, &mut bytes);
+            if bytes.len() > before {
+                frames.push((bytes.len(), sensor.next_time_us()));
+            }
         }
         robot.advance(ends - now);
         now = ends;
@@ -110,6 +116,7 @@ pub fn drive(settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
     Drive {
         world,
         bytes,
+        frames,
         moments,
         distance: robot.driven,
         clearance,
