@@ -340,3 +340,57 @@ fn replayed_bytes_have_their_times() {
         );
     }
 }
+
+/// Every beam's time, where each frame is picked up as soon as it has come in.
+#[test]
+fn beams_have_the_times_at_which_they_were_measured() {
+    for model in Model::ALL {
+        let start_us = 5_000_000.0;
+        let mut sensor = encoder::for_model(model);
+        let mut recorder = timed::Recorder::new(Vec::new()).expect("memory");
+        let mut truth = Vec::new();
+        while sensor.next_time_us() < 4e6 {
+            let mut line = Vec::new();
+            let mut look = |time_us: f64, _| {
+                truth.push(time_us);
+                Some(Echo {
+                    range_mm: 1000.0,
+                    intensity: 90,
+                })
+            };
+            sensor.fire(&mut look, &mut line);
+            if !line.is_empty() {
+                let on_line_us = line.len() as f64 * 1e7 / f64::from(model.baud);
+                let time_us = (sensor.next_time_us() + start_us + on_line_us) as u64;
+                recorder
+                    .push(time_us, timed::Content::Bytes(&line))
+                    .expect("memory");
+            }
+        }
+        let file = recorder.finish().expect("memory");
+        let mut times = Vec::new();
+        let decoded = decode::decode(model.name, &file, &mut |row| times.push(row.time_us));
+        decoded.expect("known");
+        let own_clock = matches!(model.family, Family::Ldrobot(_) | Family::Scip(_));
+        let zero = if own_clock { 0.0 } else { start_us };
+        // The first second teaches clocks of whole milliseconds their pace.
+        let late: Vec<f64> = times
+            .iter()
+            .zip(&truth)
+            .skip(times.len() / 4)
+            .map(|(&time_us, truth)| f64::from(time_us) - truth - zero)
+            .collect();
+        let mean = late.iter().sum::<f64>() / late.len() as f64;
+        let spread = late
+            .iter()
+            .map(|late| (late - mean).abs())
+            .fold(0.0, f64::max);
+        println!(
+            "{:<18} {mean:>8.0} µs late, at most {spread:>6.0} µs off that",
+            model.name
+        );
+        // A stamp is a millisecond wide; LD14P frames last exactly three, so that nothing tells where in one they lie.
+        assert!(mean.abs() < 500.0, "{}: {mean}", model.name);
+        assert!(spread < 250.0, "{}: {spread}", model.name);
+    }
+}
