@@ -8,7 +8,7 @@ use beamfix_app::{
     App, CONFIG,
     command::{Command, beam_bytes},
     link::{self, Receiver},
-    telemetry::Telemetry,
+    telemetry::{Reset, Telemetry},
 };
 use libfuzzer_sys::fuzz_target;
 
@@ -24,6 +24,11 @@ enum Piece {
         interval_us: u16,
     },
     Health,
+    /// Also the lidar's bytes and beams.
+    Send {
+        raw: bool,
+        scans: bool,
+    },
 }
 
 fuzz_target!(|pieces: Vec<Piece>| {
@@ -37,7 +42,7 @@ fuzz_target!(|pieces: Vec<Piece>| {
         let counters = receiver.counters();
         assert_eq!((counters.errors, counters.frames), (0, messages));
     };
-    read(app.ready());
+    read(app.ready(Reset::Other));
     for piece in &pieces {
         let mut commands = heapless::Vec::<u8, 2048>::new();
         match *piece {
@@ -81,6 +86,9 @@ fuzz_target!(|pieces: Vec<Piece>| {
                     };
                     assert!(link::append(&command, &mut commands));
                 }
+            }
+            Piece::Send { raw, scans } => {
+                assert!(link::append(&Command::Send { raw, scans }, &mut commands));
             }
             Piece::Health => assert!(link::append(&Command::Health, &mut commands)),
         }
