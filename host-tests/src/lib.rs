@@ -16,4 +16,5 @@ pub mod score;
 pub mod shared;
 pub mod sim;
 pub mod size;
+pub mod telemetry_file;
 pub mod timed;

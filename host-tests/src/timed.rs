@@ -1,6 +1,7 @@
 //! Recordings: a lidar's bytes with the times at which they came in, and where the wheels said the robot was.
 //!
-//! Replayed, the drivers see bit for bit what they saw on the robot.
+//! Replayed, the drivers see bit for bit what they saw on the robot. A board's own frames become such a recording by
+//! [`crate::telemetry_file`].
 //!
 //! | bytes | |
 //! | --- | --- |

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
 use beamfix::lidar::identify;
-use host_tests::{decode, readers::bytes, timed};
+use host_tests::{decode, readers::bytes, telemetry_file, timed};
 use serde_json::json;
 
 use super::output;
@@ -17,7 +17,7 @@ pub struct Args {
     /// The sensor that the bytes come from.
     #[arg(long, value_name = "MODEL")]
     lidar: String,
-    /// The capture, packed with gzip or not.
+    /// The capture: the sensor's bytes, a recording of `simulate`, or what a board has sent; packed with gzip or not.
     file: PathBuf,
     /// Where to write `scan,time_us,angle_deg,range_mm,quality`; an empty range is no return.
     #[arg(long, value_name = "FILE")]
@@ -30,7 +30,10 @@ pub struct Args {
 /// Decodes the file.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let name = args.file.display();
-    let content = bytes::load(&args.file)?;
+    let mut content = bytes::load(&args.file)?;
+    if let Some(recording) = telemetry_file::recording(&content.bytes) {
+        content.bytes = recording;
+    }
     let mut csv = args.csv.as_deref().map(output::create).transpose()?;
     let mut written = Ok(());
     if let Some(csv) = &mut csv {

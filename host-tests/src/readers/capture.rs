@@ -9,6 +9,7 @@ use beamfix::scan::bins::{Bins, Keep};
 
 use super::{Log, Recorded, bytes};
 use crate::decode::{self, Summary};
+use crate::telemetry_file;
 use crate::timed::{self, Content};
 
 /// Most beams of a turn that are matched; of a finer sensor's, one for each of so many directions.
@@ -83,7 +84,10 @@ pub fn read(path: &Path, lidar: &str) -> Result<Log> {
 }
 
 /// Reads a capture that was loaded already.
-pub(super) fn parse(name: &str, content: bytes::Content, lidar: &str) -> Result<Log> {
+pub(super) fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Result<Log> {
+    if let Some(recording) = telemetry_file::recording(&content.bytes) {
+        content.bytes = recording;
+    }
     let (turns, summary) = turns(lidar, &content.bytes)?;
     ensure!(
         summary.packets > 0,
