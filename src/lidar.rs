@@ -40,6 +40,7 @@ pub mod identify;
     feature = "embedded-hal-nb"
 ))]
 pub mod io;
+pub mod layout;
 pub mod ld06;
 pub mod lds01;
 pub mod model;
@@ -56,6 +57,7 @@ pub mod xv11;
 pub mod ydlidar;
 
 pub use framing::{Framer, Verdict};
+pub use layout::Layout;
 pub use model::{Family, Model};
 pub use packet::{Packet, Reading, Sample, View};
 pub use parser::{Format, Parser};

@@ -7,6 +7,7 @@ use beamfix::lidar::{
     Family, Format, Model, Packet, Protocol, camsense, coin_d4, delta, ld06, lds01, rplidar, sick,
     xv11, ydlidar,
 };
+use beamfix::scan::Assembler;
 use host_tests::encoder::{self, Echo, Encoder, damage};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng, seq::IndexedRandom};
@@ -113,18 +114,28 @@ fn ydlidar_turns_begin_without_their_zero_frames() {
             .collect();
         let turns = |bytes: &[u8]| {
             let mut parser = ydlidar::Parser::for_model(&model);
-            for &byte in bytes {
-                parser.push(byte);
+            let mut assembler = Box::new(Assembler::<1000>::new());
+            let (mut turns, mut longest) = (0, 0);
+            for packet in bytes.iter().filter_map(|&byte| parser.push(byte)) {
+                for (k, beam) in packet.beams().enumerate() {
+                    if assembler.push(beam, packet.turn_start() == Some(k)) {
+                        turns += 1;
+                        longest = longest.max(assembler.scan().len());
+                    }
+                }
             }
-            parser.counters().turns as usize
+            (turns, longest)
         };
-        assert_eq!(turns(&clean), zeros.len(), "{}", model.name);
+        let (whole, length) = turns(&clean);
+        assert_eq!(whole, zeros.len() - 1, "{}", model.name);
         for lost in [&zeros[5..6], &zeros[4..8]] {
             let mut line = clean.clone();
             for &at in lost {
                 line[at + 5] ^= 0x10;
             }
-            assert_eq!(turns(&line), zeros.len(), "{} without {lost:?}", model.name);
+            let (found, longest) = turns(&line);
+            assert_eq!(found, whole, "{} without {lost:?}", model.name);
+            assert!(longest < length + length / 30, "{}: {longest}", model.name);
         }
     }
 }

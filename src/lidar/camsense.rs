@@ -13,9 +13,10 @@
 //! | … | angle of the last point + `0xA000` | 1/64° clockwise, `u16` LE |
 //! | … | check code, as on the XV-11 | `u16` LE |
 
-use super::packet::{Turns, divided, from_deg_q6};
-use super::timing::Pace;
-use super::{Model, Reading, Verdict, View, xv11};
+use super::layout::{Context, Fan, Plain};
+use super::packet::{divided, from_deg_q6};
+use super::{Layout, Reading, Verdict, View, xv11};
+use crate::scan::NoReturn;
 
 /// Most points of a frame.
 pub const MOST_POINTS: usize = 40;
@@ -23,35 +24,20 @@ pub const MOST_POINTS: usize = 40;
 pub const FRAME: usize = 12 + 4 * MOST_POINTS;
 
 /// Push parser. About 280 bytes.
-pub type Parser = super::Parser<Format, FRAME>;
+pub type Parser = super::Parser<Plain<Frames>, FRAME>;
 
-impl Parser {
-    /// Any of the family.
-    #[must_use]
-    pub const fn for_model(model: &Model) -> Self {
-        let format = Format {
-            base: View::of(model, 0),
-            turns: Turns::new(),
-        };
-        Self::with_format(format, model.baud)
-    }
-}
-
-/// State of the parser.
+/// Camsense frames.
 #[derive(Debug, Clone)]
-pub struct Format {
-    base: View,
-    turns: Turns,
-}
+pub struct Frames;
 
-impl super::Format for Format {
+impl Layout for Frames {
     type Packet = Packet;
 
-    fn judge(&self, bytes: &[u8]) -> Verdict {
+    fn judge(bytes: &[u8]) -> Verdict {
         judge(bytes)
     }
 
-    fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {
+    fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
         let &[
             _,
             _,
@@ -61,7 +47,7 @@ impl super::Format for Format {
             v1,
             a0,
             a1,
-            ref body @ ..,
+            ref points @ ..,
             b0,
             b1,
             _,
@@ -71,22 +57,14 @@ impl super::Format for Format {
             return None;
         };
         let first = angle(a0, a1)?;
-        let last = angle(b0, b1)?;
-        let step = divided(last.wrapping_sub(first), u32::from(count).saturating_sub(1));
-        let mut points = [0; 4 * MOST_POINTS];
-        points.get_mut(..body.len())?.copy_from_slice(body);
+        let span = angle(b0, b1)?.wrapping_sub(first);
+        let step = divided(span, u32::from(count).saturating_sub(1));
+        let fan = Fan::new(first, step, point_bytes(kind), points)?;
+        let period_q8 = context.base.period_q8;
         Some(Packet {
             speed_rpm_q6: u16::from_le_bytes([v0, v1]),
-            view: View {
-                first_us: pace.first_us(count.into(), self.base.period_q8, frame.len() as u16),
-                turn_start: self.turns.find(first, step, count.into()),
-                ..self.base
-            },
-            first,
-            step,
-            point_bytes: point_bytes(kind),
-            bytes: body.len() as u8,
-            points,
+            view: context.view(&fan, period_q8),
+            fan,
         })
     }
 }
@@ -140,11 +118,7 @@ pub struct Packet {
     /// Speed of the motor (rpm/64).
     pub speed_rpm_q6: u16,
     view: View,
-    first: u32,
-    step: u32,
-    point_bytes: u8,
-    bytes: u8,
-    points: [u8; 4 * MOST_POINTS],
+    fan: Fan<{ 4 * MOST_POINTS }>,
 }
 
 impl super::Packet for Packet {
@@ -157,26 +131,11 @@ impl super::Packet for Packet {
     }
 
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
-        let points = self.points.get(..usize::from(self.bytes)).unwrap_or(&[]);
-        let mut angle = self.first;
-        points
-            .chunks_exact(usize::from(self.point_bytes).max(2))
-            .map(move |point| {
-                let (word, quality) = match *point {
-                    [w0, w1] => (u16::from_le_bytes([w0, w1]), 0),
-                    [w0, w1, quality] => (u16::from_le_bytes([w0, w1]), quality.into()),
-                    [w0, w1, q0, q1] => {
-                        (u16::from_le_bytes([w0, w1]), u16::from_le_bytes([q0, q1]))
-                    }
-                    _ => (0, 0),
-                };
-                let reading = Reading {
-                    angle,
-                    range: xv11::range(word),
-                    quality,
-                };
-                angle = angle.wrapping_add(self.step);
-                reading
-            })
+        self.fan.readings(|point| match *point {
+            [w0, w1] => (xv11::range([w0, w1]), 0),
+            [w0, w1, quality] => (xv11::range([w0, w1]), quality.into()),
+            [w0, w1, q0, q1] => (xv11::range([w0, w1]), u16::from_le_bytes([q0, q1])),
+            _ => (Err(NoReturn::Nothing), 0),
+        })
     }
 }

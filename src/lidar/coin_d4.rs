@@ -12,9 +12,10 @@
 //! | 8 | XOR of the bytes at even offsets; at odd ones | without these two |
 //! | 10 + 3k | intensity; 2 flags and 14 bits of distance, 0 for none | `u8`; mm, `u16` LE |
 
-use super::packet::{Turns, divided, from_deg_q7};
-use super::timing::Pace;
-use super::{Model, Reading, Verdict, View};
+use super::layout::{Context, Fan, Plain};
+use super::packet::{divided, from_deg_q7};
+use super::{Layout, Reading, Verdict, View};
+use crate::scan::NoReturn;
 
 /// Most samples of a frame.
 pub const MOST_SAMPLES: usize = 80;
@@ -26,54 +27,32 @@ pub const START: [u8; 4] = [0xaa, 0x55, 0xf0, 0x0f];
 pub const STOP: [u8; 4] = [0xaa, 0x55, 0xf5, 0x0a];
 
 /// Push parser. About 360 bytes.
-pub type Parser = super::Parser<Format, FRAME>;
+pub type Parser = super::Parser<Plain<Frames>, FRAME>;
 
-impl Parser {
-    /// Any of the family.
-    #[must_use]
-    pub const fn for_model(model: &Model) -> Self {
-        let format = Format {
-            base: View::of(model, 0),
-            turns: Turns::new(),
-        };
-        Self::with_format(format, model.baud)
-    }
-}
-
-/// State of the parser.
+/// COIN-D4 frames.
 #[derive(Debug, Clone)]
-pub struct Format {
-    base: View,
-    turns: Turns,
-}
+pub struct Frames;
 
-impl super::Format for Format {
+impl Layout for Frames {
     type Packet = Packet;
 
-    fn judge(&self, bytes: &[u8]) -> Verdict {
+    fn judge(bytes: &[u8]) -> Verdict {
         judge(bytes)
     }
 
-    fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {
-        let &[_, _, speed, count, a0, a1, b0, b1, _, _, ref body @ ..] = frame else {
+    fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
+        let &[_, _, speed, count, a0, a1, b0, b1, _, _, ref points @ ..] = frame else {
             return None;
         };
         let first = from_deg_q7(u16::from_le_bytes([a0, a1]).into());
         let last = from_deg_q7(u16::from_le_bytes([b0, b1]).into());
         let step = divided(last.wrapping_sub(first), u32::from(count).saturating_sub(1));
-        let mut samples = [0; 3 * MOST_SAMPLES];
-        samples.get_mut(..body.len())?.copy_from_slice(body);
+        let fan = Fan::new(first, step, 3, points)?;
+        let period_q8 = context.base.period_q8;
         Some(Packet {
             speed_dhz: (speed & 1 == 1).then_some(speed >> 1),
-            view: View {
-                first_us: pace.first_us(count.into(), self.base.period_q8, frame.len() as u16),
-                turn_start: self.turns.find(first, step, count.into()),
-                ..self.base
-            },
-            first,
-            step,
-            bytes: body.len() as u8,
-            samples,
+            view: context.view(&fan, period_q8),
+            fan,
         })
     }
 }
@@ -112,10 +91,7 @@ pub struct Packet {
     /// Speed (0.1 turns/s), where the frame tells.
     pub speed_dhz: Option<u8>,
     view: View,
-    first: u32,
-    step: u32,
-    bytes: u8,
-    samples: [u8; 3 * MOST_SAMPLES],
+    fan: Fan<{ 3 * MOST_SAMPLES }>,
 }
 
 impl super::Packet for Packet {
@@ -128,20 +104,12 @@ impl super::Packet for Packet {
     }
 
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
-        let samples = self.samples.get(..usize::from(self.bytes)).unwrap_or(&[]);
-        let mut angle = self.first;
-        samples.chunks_exact(3).map(move |sample| {
-            let (quality, mm) = match *sample {
-                [quality, low, high] => (quality, u16::from_le_bytes([low, high]) >> 2),
-                _ => (0, 0),
-            };
-            let reading = Reading {
-                angle,
-                range: Reading::range_q2(u32::from(mm) << 2),
-                quality: quality.into(),
-            };
-            angle = angle.wrapping_add(self.step);
-            reading
+        self.fan.readings(|sample| match *sample {
+            [quality, low, high] => {
+                let mm = u16::from_le_bytes([low, high]) >> 2;
+                (Reading::range_q2(u32::from(mm) << 2), quality.into())
+            }
+            _ => (Err(NoReturn::Nothing), 0),
         })
     }
 }

@@ -16,9 +16,11 @@
 //! | … | n points: signal; distance, 0 for none | `u8`; mm/4, `u16` BE |
 //! | L | sum of all before | `u16` BE |
 
+use super::layout::{Context, Fan};
 use super::packet::{Turns, divided, from_cdeg};
 use super::timing::Pace;
 use super::{Family, Model, Reading, Verdict, View};
+use crate::scan::NoReturn;
 
 /// Bytes of the longest frame.
 pub const FRAME: usize = 1026;
@@ -143,14 +145,13 @@ impl super::Format for Format {
             return None;
         };
         let points = points.get(..3 * MOST_POINTS).unwrap_or(points);
-        let count = (points.len() / 3) as u16;
-        let (mut first, mut step, mut turn_start) = (0, 0, None);
+        let count = (points.len() / 3) as u32;
+        let (mut first, mut step) = (0, 0);
         if command == 0xad {
-            let span = from_cdeg(self.span_cdeg(start_cdeg, end_cdeg));
             first = from_cdeg(start_cdeg.into());
-            step = divided(span, count.into());
-            turn_start = self.turns.find(first, step, count);
+            step = divided(from_cdeg(self.span_cdeg(start_cdeg, end_cdeg)), count);
         }
+        let fan = Fan::new(first, step, 3, points)?;
         // A turn at so many 0.05 turns a second takes 20e6 µs divided by them; `step` is a share of 2³² of it.
         let turn_us = divided(20_000_000, speed_q05.into());
         let period_q8 = if turn_us == 0 || step == 0 {
@@ -158,26 +159,18 @@ impl super::Format for Format {
         } else {
             ((u64::from(turn_us) * u64::from(step)) >> 24) as u32
         };
-        let mut packet = Packet {
+        let context = Context {
+            base: self.base,
+            turns: &mut self.turns,
+            pace,
+            bytes: frame.len() as u16,
+        };
+        Some(Packet {
             command,
             speed_q05,
-            view: View {
-                first_us: pace.first_us(count, period_q8, frame.len() as u16),
-                period_q8,
-                turn_start,
-                ..self.base
-            },
-            first,
-            step,
-            bytes: 3 * count,
-            points: [0; 3 * MOST_POINTS],
-        };
-        let bytes = usize::from(packet.bytes);
-        packet
-            .points
-            .get_mut(..bytes)?
-            .copy_from_slice(points.get(..bytes)?);
-        Some(packet)
+            view: context.view(&fan, period_q8),
+            fan,
+        })
     }
 }
 
@@ -228,10 +221,7 @@ pub struct Packet {
     /// Speed of the motor (0.05 turns/s).
     pub speed_q05: u8,
     view: View,
-    first: u32,
-    step: u32,
-    bytes: u16,
-    points: [u8; 3 * MOST_POINTS],
+    fan: Fan<{ 3 * MOST_POINTS }>,
 }
 
 impl super::Packet for Packet {
@@ -244,20 +234,12 @@ impl super::Packet for Packet {
     }
 
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
-        let points = self.points.get(..usize::from(self.bytes)).unwrap_or(&[]);
-        let mut angle = self.first;
-        points.chunks_exact(3).map(move |point| {
-            let (quality, quarters) = match *point {
-                [quality, d0, d1] => (quality, u16::from_be_bytes([d0, d1])),
-                _ => (0, 0),
-            };
-            let reading = Reading {
-                angle,
-                range: Reading::range_q2(quarters.into()),
-                quality: quality.into(),
-            };
-            angle = angle.wrapping_add(self.step);
-            reading
+        self.fan.readings(|point| match *point {
+            [quality, d0, d1] => {
+                let quarters = u16::from_be_bytes([d0, d1]);
+                (Reading::range_q2(quarters.into()), quality.into())
+            }
+            _ => (Err(NoReturn::Nothing), 0),
         })
     }
 }

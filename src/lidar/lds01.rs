@@ -10,9 +10,10 @@
 //! | 4 + 6k | intensity; distance, 0 for none; reserved | `u16` LE; mm, `u16` LE; `u16` |
 //! | 40 | inverted sum of all before, twice | `u8`; `u8` |
 
-use super::packet::{Turns, divided, from_cdeg};
-use super::timing::Pace;
-use super::{Model, Reading, Verdict, View};
+use super::layout::{Context, Fan, Plain};
+use super::packet::{divided, from_cdeg};
+use super::{Layout, Reading, Verdict, View};
+use crate::scan::NoReturn;
 
 /// Bytes of a frame.
 pub const FRAME: usize = 42;
@@ -22,56 +23,37 @@ pub const START: u8 = b'b';
 pub const STOP: u8 = b'e';
 
 /// Push parser. About 150 bytes.
-pub type Parser = super::Parser<Format, FRAME>;
+pub type Parser = super::Parser<Plain<Frames>, FRAME>;
 
-impl Parser {
-    /// Any of the family.
-    #[must_use]
-    pub const fn for_model(model: &Model) -> Self {
-        let format = Format {
-            base: View::of(model, 4),
-            turns: Turns::new(),
-        };
-        Self::with_format(format, model.baud)
-    }
-}
-
-/// State of the parser.
+/// LDS-01 frames.
 #[derive(Debug, Clone)]
-pub struct Format {
-    base: View,
-    turns: Turns,
-}
+pub struct Frames;
 
-impl super::Format for Format {
+impl Layout for Frames {
     type Packet = Packet;
+    const QUALITY_SHIFT: u8 = 4;
 
-    fn judge(&self, bytes: &[u8]) -> Verdict {
+    fn judge(bytes: &[u8]) -> Verdict {
         judge(bytes)
     }
 
-    fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {
-        let frame: &[u8; FRAME] = frame.try_into().ok()?;
-        let &[_, index, v0, v1, ref points @ .., _, _] = frame;
+    fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
+        let &[_, index, v0, v1, ref points @ .., _, _] = frame else {
+            return None;
+        };
         let index = index.saturating_sub(0xa0);
         let speed_drpm = u16::from_le_bytes([v0, v1]);
-        let first = from_cdeg(600 * u32::from(index));
+        let fan = Fan::new(from_cdeg(600 * u32::from(index)), from_cdeg(100), 6, points)?;
         // A degree at so many 0.1 rpm takes 10e6 / 6 µs divided by them.
         let period_q8 = match u32::from(speed_drpm) {
             speed @ 1000..10_000 => divided(426_666_667, speed),
-            _ => self.base.period_q8,
+            _ => context.base.period_q8,
         };
         Some(Packet {
             index,
             speed_drpm,
-            view: View {
-                first_us: pace.first_us(6, period_q8, FRAME as u16),
-                period_q8,
-                turn_start: self.turns.find(first, from_cdeg(100), 6),
-                ..self.base
-            },
-            first,
-            points: *points,
+            view: context.view(&fan, period_q8),
+            fan,
         })
     }
 }
@@ -104,8 +86,7 @@ pub struct Packet {
     /// Speed of the motor (0.1 rpm).
     pub speed_drpm: u16,
     view: View,
-    first: u32,
-    points: [u8; 36],
+    fan: Fan<36>,
 }
 
 impl super::Packet for Packet {
@@ -118,21 +99,13 @@ impl super::Packet for Packet {
     }
 
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
-        let mut angle = self.first;
-        self.points.chunks_exact(6).map(move |point| {
-            let (quality, mm) = match *point {
-                [q0, q1, d0, d1, _, _] => {
-                    (u16::from_le_bytes([q0, q1]), u16::from_le_bytes([d0, d1]))
-                }
-                _ => (0, 0),
-            };
-            let reading = Reading {
-                angle,
-                range: Reading::range_q2(u32::from(mm) << 2),
-                quality,
-            };
-            angle = angle.wrapping_add(from_cdeg(100));
-            reading
+        self.fan.readings(|point| match *point {
+            [q0, q1, d0, d1, _, _] => {
+                let mm = u16::from_le_bytes([d0, d1]);
+                let range = Reading::range_q2(u32::from(mm) << 2);
+                (range, u16::from_le_bytes([q0, q1]))
+            }
+            _ => (Err(NoReturn::Nothing), 0),
         })
     }
 }

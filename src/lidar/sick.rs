@@ -13,9 +13,9 @@
 //! Answer `0xB0`: `u16` (count in bits 9:0, partial scan in 12:11, unit in 15:14: 0 cm, 1 mm), as many `u16` with 13
 //! bits of distance, a status byte. Counter-clockwise from the right-hand side.
 
+use super::layout::{Context, Fan, Plain};
 use super::packet::from_cdeg;
-use super::timing::Pace;
-use super::{Model, Reading, Verdict, View};
+use super::{Layout, Reading, Verdict, View};
 use crate::scan::NoReturn;
 
 /// Bytes of the longest telegram.
@@ -43,60 +43,35 @@ pub const HALF_DEGREES: [u8; 5] = [0x3b, 0xb4, 0x00, 0x32, 0x00];
 pub const WHOLE_DEGREES: [u8; 5] = [0x3b, 0xb4, 0x00, 0x64, 0x00];
 
 /// Push parser. About 950 bytes; a packet has 850.
-pub type Parser = super::Parser<Format, FRAME>;
+pub type Parser = super::Parser<Plain<Telegrams>, FRAME>;
 
-impl Parser {
-    /// Any of the family.
-    #[must_use]
-    pub const fn for_model(model: &Model) -> Self {
-        let format = Format {
-            base: View::of(model, 0),
-        };
-        Self::with_format(format, model.baud)
-    }
-}
-
-/// State of the parser.
+/// Telegrams of the sensor's.
 #[derive(Debug, Clone)]
-pub struct Format {
-    base: View,
-}
+pub struct Telegrams;
 
-impl super::Format for Format {
+impl Layout for Telegrams {
     type Packet = Packet;
 
-    fn judge(&self, bytes: &[u8]) -> Verdict {
+    fn judge(bytes: &[u8]) -> Verdict {
         judge(bytes)
     }
 
-    fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {
+    fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
         let (body, _) = frame.split_last_chunk::<2>()?;
         let &[_, _, _, _, answer, ref data @ ..] = body else {
             return None;
         };
-        let mut packet = Packet {
-            answer,
-            unit_q2: 0,
-            view: self.base,
-            first: 0,
-            step: 0,
-            count: 0,
-            values: [0; 2 * MOST_VALUES],
-        };
         let (0xb0, &[h0, h1, ref values @ ..]) = (answer, data) else {
-            return Some(packet);
+            return Some(Packet {
+                answer,
+                unit_q2: 0,
+                view: context.base,
+                fan: Fan::new(0, 0, 2, &[])?,
+            });
         };
         let header = u16::from_le_bytes([h0, h1]);
-        let count = (header & 0x3ff)
-            .min(MOST_VALUES as u16)
-            .min((values.len() / 2) as u16);
-        let bytes = 2 * usize::from(count);
-        packet
-            .values
-            .get_mut(..bytes)?
-            .copy_from_slice(values.get(..bytes)?);
-        packet.count = count;
-        packet.unit_q2 = if header >> 14 == 1 { 4 } else { 40 };
+        let count = usize::from(header & 0x3ff).min(MOST_VALUES);
+        let values = values.get(..2 * count).unwrap_or(values);
         // The count says which of the sensor's fields of view and steps this is.
         let (start_cdeg, step_cdeg) = match count {
             361 => (0, 50),
@@ -110,15 +85,23 @@ impl super::Format for Format {
         } else {
             0
         };
-        packet.first = from_cdeg(start_cdeg + 25 * u32::from(partial));
-        packet.step = from_cdeg(step_cdeg);
+        let first = from_cdeg(start_cdeg + 25 * u32::from(partial));
+        let fan = Fan::new(first, from_cdeg(step_cdeg), 2, values)?;
         // The mirror takes 13.3 ms a turn; half degrees take two, quarter degrees four.
         const DEGREE_Q8: u32 = 3_413_333 / 360;
         let turns = 100 / step_cdeg as u16;
-        packet.view.period_q8 = DEGREE_Q8 / u32::from(turns);
-        packet.view.first_us = pace.first_us(360 * turns, DEGREE_Q8, frame.len() as u16);
-        packet.view.turn_start = (count > 0).then_some(0);
-        Some(packet)
+        let first_us = context.pace.first_us(360 * turns, DEGREE_Q8, context.bytes);
+        Some(Packet {
+            answer,
+            unit_q2: if header >> 14 == 1 { 4 } else { 40 },
+            view: View {
+                first_us,
+                period_q8: DEGREE_Q8 / u32::from(turns),
+                turn_start: (fan.count() > 0).then_some(0),
+                ..context.base
+            },
+            fan,
+        })
     }
 }
 
@@ -182,10 +165,7 @@ pub struct Packet {
     pub answer: u8,
     unit_q2: u8,
     view: View,
-    first: u32,
-    step: u32,
-    count: u16,
-    values: [u8; 2 * MOST_VALUES],
+    fan: Fan<{ 2 * MOST_VALUES }>,
 }
 
 impl super::Packet for Packet {
@@ -194,28 +174,18 @@ impl super::Packet for Packet {
     }
 
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
-        let values = self
-            .values
-            .get(..2 * usize::from(self.count))
-            .unwrap_or(&[]);
-        let mut angle = self.first;
-        values.chunks_exact(2).map(move |value| {
+        self.fan.readings(|value| {
             let value = match *value {
                 [low, high] => u16::from_le_bytes([low, high]) & 0x1fff,
                 _ => 0,
             };
-            let reading = Reading {
-                angle,
-                range: match value {
-                    // The last nine values are the sensor's error codes; the first of them is "too far".
-                    0x1ff7 => Err(NoReturn::TooFar),
-                    0x1ff8.. => Err(NoReturn::Sensor(value as u8)),
-                    _ => Reading::range_q2(u32::from(value) * u32::from(self.unit_q2)),
-                },
-                quality: 0,
+            let range = match value {
+                // The last nine values are the sensor's error codes; the first of them is "too far".
+                0x1ff7 => Err(NoReturn::TooFar),
+                0x1ff8.. => Err(NoReturn::Sensor(value as u8)),
+                _ => Reading::range_q2(u32::from(value) * u32::from(self.unit_q2)),
             };
-            angle = angle.wrapping_add(self.step);
-            reading
+            (range, 0)
         })
     }
 }

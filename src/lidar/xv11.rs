@@ -14,65 +14,46 @@
 
 pub mod early;
 
-use super::packet::{Turns, divided, from_cdeg};
-use super::timing::Pace;
-use super::{Model, Reading, Verdict, View};
+use super::layout::{Context, Fan, Plain};
+use super::packet::{divided, from_cdeg};
+use super::{Layout, Reading, Verdict, View};
 use crate::scan::NoReturn;
 
 /// Bytes of a packet.
 pub const FRAME: usize = 22;
 
 /// Push parser. About 130 bytes.
-pub type Parser = super::Parser<Format, FRAME>;
+pub type Parser = super::Parser<Plain<Frames>, FRAME>;
 
-impl Parser {
-    /// Any of the family.
-    #[must_use]
-    pub const fn for_model(model: &Model) -> Self {
-        let format = Format {
-            base: View::of(model, 4),
-            turns: Turns::new(),
-        };
-        Self::with_format(format, model.baud)
-    }
-}
-
-/// State of the parser.
+/// XV-11 packets.
 #[derive(Debug, Clone)]
-pub struct Format {
-    base: View,
-    turns: Turns,
-}
+pub struct Frames;
 
-impl super::Format for Format {
+impl Layout for Frames {
     type Packet = Packet;
+    const QUALITY_SHIFT: u8 = 4;
 
-    fn judge(&self, bytes: &[u8]) -> Verdict {
+    fn judge(bytes: &[u8]) -> Verdict {
         judge(bytes)
     }
 
-    fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {
-        let frame: &[u8; FRAME] = frame.try_into().ok()?;
-        let &[_, index, v0, v1, ref points @ .., _, _] = frame;
+    fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
+        let &[_, index, v0, v1, ref points @ .., _, _] = frame else {
+            return None;
+        };
         let index = index.saturating_sub(0xa0);
         let speed_rpm_q6 = u16::from_le_bytes([v0, v1]);
-        let first = from_cdeg(400 * u32::from(index));
+        let fan = Fan::new(from_cdeg(400 * u32::from(index)), from_cdeg(100), 4, points)?;
         // A degree at so many rpm/64 takes 64e6 / 6 µs divided by them.
         let period_q8 = match u32::from(speed_rpm_q6) {
             speed @ 6400..40_000 => divided(2_730_666_667, speed),
-            _ => self.base.period_q8,
+            _ => context.base.period_q8,
         };
         Some(Packet {
             index,
             speed_rpm_q6,
-            view: View {
-                first_us: pace.first_us(4, period_q8, FRAME as u16),
-                period_q8,
-                turn_start: self.turns.find(first, from_cdeg(100), 4),
-                ..self.base
-            },
-            first,
-            points: *points,
+            view: context.view(&fan, period_q8),
+            fan,
         })
     }
 }
@@ -102,12 +83,21 @@ pub(super) fn check_code(body: &[u8]) -> u16 {
     ((sum & 0x7fff).wrapping_add(sum >> 15) & 0x7fff) as u16
 }
 
-/// Distance word and strength of a point of this family.
-pub(super) fn range(word: u16) -> Result<u32, NoReturn> {
+/// Range of a point by its distance word, in mm/4.
+pub(super) fn range(word: [u8; 2]) -> Result<u32, NoReturn> {
+    let word = u16::from_le_bytes(word);
     if word & 0x8000 != 0 {
         Err(NoReturn::Sensor(word as u8))
     } else {
         Reading::range_q2(u32::from(word & 0x3fff) << 2)
+    }
+}
+
+/// Range and strength of a point of four bytes.
+fn point(bytes: &[u8]) -> (Result<u32, NoReturn>, u16) {
+    match *bytes {
+        [w0, w1, q0, q1] => (range([w0, w1]), u16::from_le_bytes([q0, q1])),
+        _ => (Err(NoReturn::Nothing), 0),
     }
 }
 
@@ -120,8 +110,7 @@ pub struct Packet {
     /// Speed of the motor (rpm/64).
     pub speed_rpm_q6: u16,
     view: View,
-    first: u32,
-    points: [u8; 16],
+    fan: Fan<16>,
 }
 
 impl super::Packet for Packet {
@@ -134,24 +123,6 @@ impl super::Packet for Packet {
     }
 
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
-        readings(self.first, &self.points)
+        self.fan.readings(point)
     }
-}
-
-/// Points of four bytes, a degree apart.
-fn readings(first: u32, points: &[u8]) -> impl Iterator<Item = Reading> + '_ {
-    let mut angle = first;
-    points.chunks_exact(4).map(move |point| {
-        let (word, quality) = match *point {
-            [w0, w1, q0, q1] => (u16::from_le_bytes([w0, w1]), u16::from_le_bytes([q0, q1])),
-            _ => (0, 0),
-        };
-        let reading = Reading {
-            angle,
-            range: range(word),
-            quality,
-        };
-        angle = angle.wrapping_add(from_cdeg(100));
-        reading
-    })
 }

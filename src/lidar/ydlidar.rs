@@ -12,9 +12,8 @@
 //! | 8 | XOR of the other 16-bit words; of three-byte samples the first byte is a word | `u16` LE |
 //! | 10 | n samples | |
 //!
-//! The size of a sample cannot be read from a frame; it belongs to the model. A turn starts with the frame that says
-//! so, and where that one is lost, a little later than it would have: corrected angles are not monotonic, uncorrected
-//! ones are.
+//! The size of a sample cannot be read from a frame; it belongs to the model. A turn starts with the frame that says so;
+//! where that one is lost, [`Assembler`](crate::scan::Assembler) notices.
 
 use super::packet::{divided, from_deg_q6};
 use super::rplidar;
@@ -131,8 +130,6 @@ impl Parser {
         let format = Format {
             samples,
             base: View::of(model, shift),
-            last: None,
-            swept: 0,
         };
         Self::with_format(format, model.baud)
     }
@@ -143,30 +140,6 @@ impl Parser {
 pub struct Format {
     samples: Samples,
     base: View,
-    /// Angle of the last sample, uncorrected; 2³² is a turn.
-    last: Option<u32>,
-    /// Angle since the last turn began; 2²⁸ is a turn.
-    swept: u32,
-}
-
-impl Format {
-    /// Whether a turn begins with a frame that ends at this angle, by its own word or because it is overdue.
-    fn begins(&mut self, says_so: bool, last: u32) -> bool {
-        /// A turn and 10°: sensors put their zero a little elsewhere in each turn.
-        const OVERDUE: u32 = (1 << 28) / 36 * 37;
-
-        let before = self.last.replace(last).unwrap_or(last);
-        // Angles do not go back; where they seem to, half a turn or more is missing.
-        let passed = last.wrapping_sub(before).cast_signed().max(0);
-        self.swept = self.swept.saturating_add(passed.cast_unsigned() >> 4);
-        if says_so {
-            self.swept = 0;
-        } else if self.swept > OVERDUE {
-            self.swept -= 1 << 28;
-            return true;
-        }
-        says_so
-    }
 }
 
 impl super::Format for Format {
@@ -182,15 +155,13 @@ impl super::Format for Format {
         };
         let first_q6 = u32::from(u16::from_le_bytes([a0, a1]) >> 1);
         let last_q6 = u32::from(u16::from_le_bytes([b0, b1]) >> 1);
-        let last = from_deg_q6(last_q6);
-        let span = last.wrapping_sub(from_deg_q6(first_q6));
-        let says_so = kind & 1 == 1;
-        let begins = self.begins(says_so, last);
+        let span = from_deg_q6(last_q6).wrapping_sub(from_deg_q6(first_q6));
+        let begins = kind & 1 == 1;
         let mut samples = [0; 4 * MOST_SAMPLES];
         let target = samples.get_mut(..body.len())?;
         target.copy_from_slice(body);
         Some(Packet {
-            speed_dhz: says_so.then_some(kind >> 1),
+            speed_dhz: begins.then_some(kind >> 1),
             view: View {
                 first_us: pace.first_us(count.into(), self.base.period_q8, frame.len() as u16),
                 turn_start: begins.then_some(0),

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Result, ensure};
 use beamfix::geometry::Pose;
 use beamfix::scan::Beam;
+use beamfix::scan::assembler::TurnStarts;
 use beamfix::scan::bins::{Bins, Keep};
 
 use super::{Log, Recorded, bytes};
@@ -32,9 +33,10 @@ pub struct Turn {
 pub fn turns(lidar: &str, stream: &[u8]) -> Result<(Vec<Turn>, Summary)> {
     let mut turns = Vec::new();
     let mut present: Option<Vec<Beam>> = None;
+    let mut starts = TurnStarts::new();
     let mut count = 0;
     let summary = decode::decode(lidar, stream, &mut |row| {
-        if row.turn_starts {
+        if starts.push(row.beam.bearing, row.turn_starts) {
             if let Some(beams) = present.take().filter(|beams| !beams.is_empty()) {
                 turns.push(Turn {
                     beams: thinned(beams),

@@ -13,8 +13,8 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
-use super::super::timing::Pace;
-use super::super::{Model, Reading, Verdict, View};
+use super::super::layout::{Context, Plain};
+use super::super::{Layout, Reading, Verdict, View};
 use super::answer;
 
 /// Bytes of a packet.
@@ -23,33 +23,21 @@ const POINTS: usize = 96;
 const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 /// Push parser of HQ packets. About 900 bytes.
-pub type Parser = super::super::Parser<Format, FRAME>;
+pub type Parser = super::super::Parser<Plain<Frames>, FRAME>;
 
-impl Parser {
-    /// HQ packets.
-    #[must_use]
-    pub const fn for_model(model: &Model) -> Self {
-        let format = Format {
-            base: View::of(model, 0),
-        };
-        Self::with_format(format, model.baud)
-    }
-}
-
-/// State of the parser.
+/// HQ packets.
 #[derive(Debug, Clone)]
-pub struct Format {
-    base: View,
-}
+pub struct Frames;
 
-impl super::super::Format for Format {
+impl Layout for Frames {
     type Packet = Packet;
 
-    fn judge(&self, bytes: &[u8]) -> Verdict {
+    fn judge(bytes: &[u8]) -> Verdict {
         judge(bytes)
     }
 
-    fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {
+    fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
+        let base = context.base;
         let frame: &[u8; FRAME] = frame.try_into().ok()?;
         let &[
             _,
@@ -70,8 +58,10 @@ impl super::super::Format for Format {
         let mut packet = Packet {
             device_time: u64::from_le_bytes([t0, t1, t2, t3, t4, t5, t6, t7]),
             view: View {
-                first_us: pace.first_us(POINTS as u16, self.base.period_q8, FRAME as u16),
-                ..self.base
+                first_us: context
+                    .pace
+                    .first_us(POINTS as u16, base.period_q8, FRAME as u16),
+                ..base
             },
             points: *points,
         };

@@ -8,56 +8,39 @@
 //! | 4 | speed | the sensor's own, `u16` LE |
 //! | 6 + 4k | distance and strength as in [`super`] | |
 
-use super::super::timing::Pace;
-use super::super::{Model, Reading, Verdict, View};
-use super::readings;
+use super::super::layout::{Context, Fan, Plain};
+use super::super::packet::from_cdeg;
+use super::super::{Layout, Reading, Verdict, View};
+use super::point;
 
 /// Bytes of a turn.
 pub const FRAME: usize = 1446;
-const POINTS: usize = 360;
 
 /// Push parser. About 1600 bytes, and as many again in each packet.
-pub type Parser = super::super::Parser<Format, FRAME>;
+pub type Parser = super::super::Parser<Plain<Frames>, FRAME>;
 
-impl Parser {
-    /// Any of the family.
-    #[must_use]
-    pub const fn for_model(model: &Model) -> Self {
-        let format = Format {
-            base: View::of(model, 4),
-            turns: 0,
-        };
-        Self::with_format(format, model.baud)
-    }
-}
-
-/// State of the parser.
+/// Frames of a whole turn each.
 #[derive(Debug, Clone)]
-pub struct Format {
-    base: View,
-    turns: u8,
-}
+pub struct Frames;
 
-impl super::super::Format for Format {
+impl Layout for Frames {
     type Packet = Packet;
+    const QUALITY_SHIFT: u8 = 4;
 
-    fn judge(&self, bytes: &[u8]) -> Verdict {
+    fn judge(bytes: &[u8]) -> Verdict {
         judge(bytes)
     }
 
-    fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {
-        let frame: &[u8; FRAME] = frame.try_into().ok()?;
-        let &[_, _, _, _, v0, v1, ref points @ ..] = frame;
-        let turn_start = (self.turns != 0).then_some(0);
-        self.turns = 1;
+    fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
+        let &[_, _, _, _, v0, v1, ref points @ ..] = frame else {
+            return None;
+        };
+        let fan = Fan::new(0, from_cdeg(100), 4, points)?;
+        let period_q8 = context.base.period_q8;
         Some(Packet {
             speed: u16::from_le_bytes([v0, v1]),
-            view: View {
-                first_us: pace.first_us(POINTS as u16, self.base.period_q8, FRAME as u16),
-                turn_start,
-                ..self.base
-            },
-            points: *points,
+            view: context.view(&fan, period_q8),
+            fan,
         })
     }
 }
@@ -81,7 +64,7 @@ pub struct Packet {
     /// Speed of the motor in the sensor's own unit.
     pub speed: u16,
     view: View,
-    points: [u8; 4 * POINTS],
+    fan: Fan<{ FRAME - 6 }>,
 }
 
 impl super::super::Packet for Packet {
@@ -90,6 +73,6 @@ impl super::super::Packet for Packet {
     }
 
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
-        readings(0, &self.points)
+        self.fan.readings(point)
     }
 }
