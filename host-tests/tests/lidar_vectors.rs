@@ -1,8 +1,6 @@
 //! Every parser against recorded and constructed bytes with known contents: `../shared/vectors` and
 //! `../shared/datasets/serial`, left out with a line that says so where they are missing.
 
-use std::path::PathBuf;
-
 use beamfix::lidar::rplidar::command;
 use beamfix::lidar::scip::command::{Parameters, Part, Replies};
 use beamfix::lidar::{Family, Model, Packet, Protocol, delta, ld06, sick, ydlidar};
@@ -12,19 +10,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
-/// The shared folder: `BEAMFIX_SHARED`, or beside the checkout.
-fn shared(path: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("BEAMFIX_SHARED").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
-        PathBuf::from,
-    );
-    let path = folder.join(path);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("left out: {} is not there", path.display());
-    None
-}
+mod common;
+use common::shared;
 
 fn vectors(family: &str) -> Vec<Value> {
     let Some(path) = shared(&format!("vectors/{family}.json")) else {

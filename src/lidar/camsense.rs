@@ -34,7 +34,27 @@ impl Layout for Frames {
     type Packet = Packet;
 
     fn judge(bytes: &[u8]) -> Verdict {
-        judge(bytes)
+        match *bytes {
+            [0x55] => Verdict::Need(2),
+            [0x55, 0xaa] | [0x55, 0xaa, _] => Verdict::Need(4),
+            [0x55, 0xaa, kind @ (2 | 3 | 7), count, ..]
+                if (1..=MOST_POINTS as u8).contains(&count) =>
+            {
+                let length = 12 + usize::from(count) * usize::from(point_bytes(kind));
+                if length % 2 == 1 {
+                    return Verdict::No;
+                }
+                Verdict::on(bytes, length, |frame| {
+                    let angles_hold = matches!(
+                        *frame,
+                        [_, _, _, _, _, _, a0, a1, .., b0, b1, _, _]
+                            if angle(a0, a1).is_some() && angle(b0, b1).is_some()
+                    );
+                    angles_hold && xv11::ends_in_code(frame)
+                })
+            }
+            _ => Verdict::No,
+        }
     }
 
     fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
@@ -81,33 +101,6 @@ const fn point_bytes(kind: u8) -> u8 {
         3 => 3,
         7 => 4,
         _ => 0,
-    }
-}
-
-/// Camsense frames among other bytes.
-pub(super) fn judge(bytes: &[u8]) -> Verdict {
-    match *bytes {
-        [0x55] => Verdict::Need(2),
-        [0x55, 0xaa] | [0x55, 0xaa, _] => Verdict::Need(4),
-        [0x55, 0xaa, kind @ (2 | 3 | 7), count, ..] if (1..=MOST_POINTS as u8).contains(&count) => {
-            let length = 12 + usize::from(count) * usize::from(point_bytes(kind));
-            if length % 2 == 1 {
-                return Verdict::No;
-            }
-            let Some((body, code)) = bytes.get(..length).and_then(<[u8]>::split_last_chunk::<2>)
-            else {
-                return Verdict::Need(length);
-            };
-            let last = body.last_chunk::<2>();
-            let angles_hold = matches!(*bytes, [_, _, _, _, _, _, a0, a1, ..] if angle(a0, a1).is_some())
-                && last.is_some_and(|&[b0, b1]| angle(b0, b1).is_some());
-            if angles_hold && xv11::check_code(body) == u16::from_le_bytes(*code) {
-                Verdict::Frame(length)
-            } else {
-                Verdict::CheckFailed
-            }
-        }
-        _ => Verdict::No,
     }
 }
 

@@ -37,7 +37,24 @@ impl Layout for Frames {
     type Packet = Packet;
 
     fn judge(bytes: &[u8]) -> Verdict {
-        judge(bytes)
+        match *bytes {
+            [0xaa] => Verdict::Need(2),
+            [0xaa, 0x55] | [0xaa, 0x55, _] => Verdict::Need(4),
+            [0xaa, 0x55, _, count, ..] if (1..=MOST_SAMPLES as u8).contains(&count) => {
+                let length = 10 + 3 * usize::from(count);
+                Verdict::on(bytes, length, |frame| {
+                    let code = frame
+                        .chunks(2)
+                        .fold((0, 0), |(even, odd), pair| match *pair {
+                            [a, b] => (even ^ a, odd ^ b),
+                            [a] => (even ^ a, odd),
+                            _ => (even, odd),
+                        });
+                    code == (0, 0)
+                })
+            }
+            _ => Verdict::No,
+        }
     }
 
     fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
@@ -54,33 +71,6 @@ impl Layout for Frames {
             view: context.view(&fan, period_q8),
             fan,
         })
-    }
-}
-
-/// COIN-D4 frames among other bytes.
-pub(super) fn judge(bytes: &[u8]) -> Verdict {
-    match *bytes {
-        [0xaa] => Verdict::Need(2),
-        [0xaa, 0x55] | [0xaa, 0x55, _] => Verdict::Need(4),
-        [0xaa, 0x55, _, count, ..] if (1..=MOST_SAMPLES as u8).contains(&count) => {
-            let length = 10 + 3 * usize::from(count);
-            let Some(frame) = bytes.get(..length) else {
-                return Verdict::Need(length);
-            };
-            let code = frame
-                .chunks(2)
-                .fold((0, 0), |(even, odd), pair| match *pair {
-                    [a, b] => (even ^ a, odd ^ b),
-                    [a] => (even ^ a, odd),
-                    _ => (even, odd),
-                });
-            if code == (0, 0) {
-                Verdict::Frame(length)
-            } else {
-                Verdict::CheckFailed
-            }
-        }
-        _ => Verdict::No,
     }
 }
 

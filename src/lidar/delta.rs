@@ -189,20 +189,13 @@ pub(super) fn judge(bytes: &[u8]) -> Verdict {
                 {
                     Verdict::No
                 }
-                [_, 0x61, _, _, _, ..] => {
-                    let frame = bytes.get(..length + 2);
-                    let Some((body, code)) = frame.and_then(<[u8]>::split_last_chunk::<2>) else {
-                        return Verdict::Need(length + 2);
-                    };
-                    let sum = body
-                        .iter()
-                        .fold(0u16, |sum, byte| sum.wrapping_add(u16::from(*byte)));
-                    if sum == u16::from_be_bytes(*code) {
-                        Verdict::Frame(length + 2)
-                    } else {
-                        Verdict::CheckFailed
-                    }
-                }
+                [_, 0x61, _, _, _, ..] => Verdict::on(bytes, length + 2, |frame| {
+                    let parts = frame.split_last_chunk::<2>();
+                    parts.is_some_and(|(body, code)| {
+                        let add = |sum: u16, byte: &u8| sum.wrapping_add(u16::from(*byte));
+                        body.iter().fold(0, add) == u16::from_be_bytes(*code)
+                    })
+                }),
                 [_, 0x61, ..] => Verdict::Need(8),
                 [_, _, ..] => Verdict::No,
                 _ => Verdict::Need(5),

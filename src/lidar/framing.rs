@@ -26,6 +26,18 @@ pub enum Verdict {
     Answer(usize),
 }
 
+impl Verdict {
+    /// On bytes whose head is that of a frame of `length`: `holds` says whether the check code is right.
+    #[must_use]
+    pub fn on(bytes: &[u8], length: usize, holds: impl FnOnce(&[u8]) -> bool) -> Self {
+        match bytes.get(..length) {
+            None => Self::Need(length),
+            Some(frame) if holds(frame) => Self::Frame(length),
+            Some(_) => Self::CheckFailed,
+        }
+    }
+}
+
 /// A frame that passed every check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame<'a> {

@@ -7,8 +7,8 @@
 use core::fmt;
 
 use super::{
-    Family, Model, Packet as _, Protocol, Verdict, camsense, coin_d4, delta, ld06, lds01, rplidar,
-    scip, sick, xv11, ydlidar,
+    Family, Layout as _, Model, Packet as _, Protocol, Verdict, camsense, coin_d4, delta, ld06,
+    lds01, rplidar, scip, sick, xv11, ydlidar,
 };
 
 /// Line speeds at which to listen, the commonest first (bits/s).
@@ -94,16 +94,16 @@ pub fn survey_model(model: &Model, bytes: &[u8]) -> Survey {
         Family::RplidarExpress | Family::RplidarDense => survey(bytes, rplidar::capsule::judge),
         Family::RplidarUltra => survey(bytes, rplidar::ultra::judge_ultra),
         Family::RplidarUltraDense => survey(bytes, rplidar::ultra::judge_ultra_dense),
-        Family::RplidarHq => survey(bytes, rplidar::hq::judge),
+        Family::RplidarHq => survey(bytes, rplidar::hq::Frames::judge),
         Family::Ydlidar(samples) => survey(bytes, |bytes| ydlidar::judge(bytes, samples.bytes)),
-        Family::Lds01 => survey(bytes, lds01::judge),
-        Family::Xv11 => survey(bytes, xv11::judge),
-        Family::Xv11Early => survey(bytes, xv11::early::judge),
+        Family::Lds01 => survey(bytes, lds01::Frames::judge),
+        Family::Xv11 => survey(bytes, xv11::Frames::judge),
+        Family::Xv11Early => survey(bytes, xv11::early::Frames::judge),
         Family::Delta(_) => survey(bytes, delta::judge),
-        Family::Camsense => survey(bytes, camsense::judge),
-        Family::CoinD4 => survey(bytes, coin_d4::judge),
+        Family::Camsense => survey(bytes, camsense::Frames::judge),
+        Family::CoinD4 => survey(bytes, coin_d4::Frames::judge),
         Family::Scip(_) => scip::survey(bytes),
-        Family::Sick => survey(bytes, sick::judge),
+        Family::Sick => survey(bytes, sick::Telegrams::judge),
     }
 }
 

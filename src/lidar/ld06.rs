@@ -172,12 +172,10 @@ impl super::Format for Format {
 pub(super) fn judge(bytes: &[u8]) -> Verdict {
     match *bytes {
         [0x54] => Verdict::Need(2),
-        [0x54, 0x2c, ..] => match bytes.get(..FRAME) {
-            None => Verdict::Need(FRAME),
-            // The code over a frame and its own code is 0.
-            Some(frame) if check_code(frame) == 0 && is_plausible(frame) => Verdict::Frame(FRAME),
-            Some(_) => Verdict::CheckFailed,
-        },
+        // The code over a frame and its own code is 0.
+        [0x54, 0x2c, ..] => Verdict::on(bytes, FRAME, |frame| {
+            check_code(frame) == 0 && is_plausible(frame)
+        }),
         _ => Verdict::No,
     }
 }

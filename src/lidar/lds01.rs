@@ -34,7 +34,14 @@ impl Layout for Frames {
     const QUALITY_SHIFT: u8 = 4;
 
     fn judge(bytes: &[u8]) -> Verdict {
-        judge(bytes)
+        match *bytes {
+            [0xfa] => Verdict::Need(2),
+            [0xfa, 0xa0..=0xdb, ..] => Verdict::on(bytes, FRAME, |frame| {
+                let parts = frame.split_last_chunk::<2>();
+                parts.is_some_and(|(body, code)| *code == [check_code(body); 2])
+            }),
+            _ => Verdict::No,
+        }
     }
 
     fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
@@ -55,20 +62,6 @@ impl Layout for Frames {
             view: context.view(&fan, period_q8),
             fan,
         })
-    }
-}
-
-/// LDS-01 frames among other bytes.
-pub(super) fn judge(bytes: &[u8]) -> Verdict {
-    match *bytes {
-        [0xfa] => Verdict::Need(2),
-        [0xfa, 0xa0..=0xdb, ..] => match bytes.get(..FRAME).and_then(<[u8]>::split_last_chunk::<2>)
-        {
-            None => Verdict::Need(FRAME),
-            Some((body, code)) if *code == [check_code(body); 2] => Verdict::Frame(FRAME),
-            Some(_) => Verdict::CheckFailed,
-        },
-        _ => Verdict::No,
     }
 }
 

@@ -53,7 +53,21 @@ impl Layout for Telegrams {
     type Packet = Packet;
 
     fn judge(bytes: &[u8]) -> Verdict {
-        judge(bytes)
+        match *bytes {
+            [0x02] => Verdict::Need(2),
+            [0x02, 0x80 | 0x00] | [0x02, 0x80 | 0x00, _] => Verdict::Need(4),
+            [0x02, 0x80 | 0x00, l0, l1, ..] => {
+                let length = usize::from(u16::from_le_bytes([l0, l1]));
+                if !(1..=FRAME - 6).contains(&length) {
+                    return Verdict::No;
+                }
+                Verdict::on(bytes, length + 6, |frame| {
+                    let parts = frame.split_last_chunk::<2>();
+                    parts.is_some_and(|(body, code)| check_code(body) == u16::from_le_bytes(*code))
+                })
+            }
+            _ => Verdict::No,
+        }
     }
 
     fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
@@ -102,32 +116,6 @@ impl Layout for Telegrams {
             },
             fan,
         })
-    }
-}
-
-/// Telegrams among other bytes.
-pub(super) fn judge(bytes: &[u8]) -> Verdict {
-    match *bytes {
-        [0x02] => Verdict::Need(2),
-        [0x02, 0x80 | 0x00] | [0x02, 0x80 | 0x00, _] => Verdict::Need(4),
-        [0x02, 0x80 | 0x00, l0, l1, ..] => {
-            let length = usize::from(u16::from_le_bytes([l0, l1]));
-            if !(1..=FRAME - 6).contains(&length) {
-                return Verdict::No;
-            }
-            let Some((body, code)) = bytes
-                .get(..length + 6)
-                .and_then(<[u8]>::split_last_chunk::<2>)
-            else {
-                return Verdict::Need(length + 6);
-            };
-            if check_code(body) == u16::from_le_bytes(*code) {
-                Verdict::Frame(length + 6)
-            } else {
-                Verdict::CheckFailed
-            }
-        }
-        _ => Verdict::No,
     }
 }
 

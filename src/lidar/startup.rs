@@ -200,6 +200,21 @@ enum Step {
     Failed(StartError),
 }
 
+impl Step {
+    /// Whether it sends a request and waits for its answer.
+    const fn asks(self) -> bool {
+        matches!(
+            self,
+            Self::Info
+                | Self::Health
+                | Self::TypicalMode
+                | Self::AnswerType
+                | Self::Period
+                | Self::Scan
+        )
+    }
+}
+
 /// The state machine. About 400 bytes.
 #[derive(Debug, Clone)]
 pub struct Startup {
@@ -330,24 +345,8 @@ impl Startup {
                 });
                 self.poll_request(now_us)
             }
-            (
-                Step::Info
-                | Step::Health
-                | Step::TypicalMode
-                | Step::AnswerType
-                | Step::Period
-                | Step::Scan,
-                None,
-            ) => self.poll_request(now_us),
-            (
-                Step::Info
-                | Step::Health
-                | Step::TypicalMode
-                | Step::AnswerType
-                | Step::Period
-                | Step::Scan,
-                Some(waited),
-            ) if waited >= self.config.answer_ms => {
+            (step, None) if step.asks() => self.poll_request(now_us),
+            (step, Some(waited)) if step.asks() && waited >= self.config.answer_ms => {
                 if self.tries >= self.config.tries {
                     return self.give_up();
                 }

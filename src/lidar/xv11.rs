@@ -34,7 +34,11 @@ impl Layout for Frames {
     const QUALITY_SHIFT: u8 = 4;
 
     fn judge(bytes: &[u8]) -> Verdict {
-        judge(bytes)
+        match *bytes {
+            [0xfa] => Verdict::Need(2),
+            [0xfa, 0xa0..=0xf9, ..] => Verdict::on(bytes, FRAME, ends_in_code),
+            _ => Verdict::No,
+        }
     }
 
     fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
@@ -58,24 +62,14 @@ impl Layout for Frames {
     }
 }
 
-/// XV-11 packets among other bytes.
-pub(super) fn judge(bytes: &[u8]) -> Verdict {
-    match *bytes {
-        [0xfa] => Verdict::Need(2),
-        [0xfa, 0xa0..=0xf9, ..] => match bytes.get(..FRAME).and_then(<[u8]>::split_last_chunk::<2>)
-        {
-            None => Verdict::Need(FRAME),
-            Some((body, code)) if check_code(body) == u16::from_le_bytes(*code) => {
-                Verdict::Frame(FRAME)
-            }
-            Some(_) => Verdict::CheckFailed,
-        },
-        _ => Verdict::No,
-    }
+/// Whether a frame's last two bytes are the check code of all before.
+pub(super) fn ends_in_code(frame: &[u8]) -> bool {
+    let parts = frame.split_last_chunk::<2>();
+    parts.is_some_and(|(body, code)| check_code(body) == u16::from_le_bytes(*code))
 }
 
 /// Fold of 16-bit words: each is added to twice the sum, and what runs over 15 bits is added again.
-pub(super) fn check_code(body: &[u8]) -> u16 {
+fn check_code(body: &[u8]) -> u16 {
     let sum = body.chunks_exact(2).fold(0u32, |sum, word| match *word {
         [low, high] => (sum << 1).wrapping_add(u16::from_le_bytes([low, high]).into()),
         _ => sum,

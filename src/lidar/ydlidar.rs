@@ -190,11 +190,7 @@ pub(super) fn judge(bytes: &[u8], sample_bytes: u8) -> Verdict {
         [0xaa, 0x55] | [0xaa, 0x55, _] => Verdict::Need(4),
         [0xaa, 0x55, _, count, ..] if (1..=MOST_SAMPLES as u8).contains(&count) => {
             let length = 10 + usize::from(count) * usize::from(sample_bytes);
-            match bytes.get(..length) {
-                None => Verdict::Need(length),
-                Some(frame) if check_code(frame, sample_bytes) == 0 => Verdict::Frame(length),
-                Some(_) => Verdict::CheckFailed,
-            }
+            Verdict::on(bytes, length, |frame| check_code(frame, sample_bytes) == 0)
         }
         _ => Verdict::No,
     }

@@ -114,16 +114,10 @@ pub(super) fn judge_capsule(bytes: &[u8], length: usize) -> Verdict {
     match *bytes {
         [0xa5, 0x5a, ..] if !matches!(answer(bytes), Verdict::No) => answer(bytes),
         [0xa0..=0xaf] => Verdict::Need(2),
-        [0xa0..=0xaf, 0x50..=0x5f, ..] if bytes.len() < length => Verdict::Need(length),
-        [low @ 0xa0..=0xaf, high @ 0x50..=0x5f, ref rest @ ..] => {
-            let body = rest.get(..length.saturating_sub(2)).unwrap_or(&[]);
-            let code = body.iter().fold(0, |code, byte| code ^ byte);
-            if code == (low & 15) | (high << 4) {
-                Verdict::Frame(length)
-            } else {
-                Verdict::CheckFailed
-            }
-        }
+        [low @ 0xa0..=0xaf, high @ 0x50..=0x5f, ..] => Verdict::on(bytes, length, |frame| {
+            let body = frame.get(2..).unwrap_or(&[]);
+            body.iter().fold(0, |code, byte| code ^ byte) == (low & 15) | (high << 4)
+        }),
         _ => Verdict::No,
     }
 }

@@ -33,7 +33,19 @@ impl Layout for Frames {
     type Packet = Packet;
 
     fn judge(bytes: &[u8]) -> Verdict {
-        judge(bytes)
+        match *bytes {
+            [0xa5] => Verdict::Need(7),
+            [0xa5, 0x5a, ..] if !matches!(answer(bytes), Verdict::No) => answer(bytes),
+            [0xa5, ..] => Verdict::on(bytes, FRAME, |frame| {
+                frame.split_last_chunk::<4>().is_some_and(|(body, code)| {
+                    let mut digest = CRC.digest();
+                    digest.update(body);
+                    digest.update(&[0; 3]);
+                    digest.finalize() == u32::from_le_bytes(*code)
+                })
+            }),
+            _ => Verdict::No,
+        }
     }
 
     fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
@@ -68,29 +80,6 @@ impl Layout for Frames {
         let starts = packet.points().position(|&[.., flag]| flag & 1 == 1);
         packet.view.turn_start = starts.map(|k| k as u16);
         Some(packet)
-    }
-}
-
-/// HQ packets among other bytes.
-pub(in crate::lidar) fn judge(bytes: &[u8]) -> Verdict {
-    match *bytes {
-        [0xa5] => Verdict::Need(7),
-        [0xa5, 0x5a, ..] if !matches!(answer(bytes), Verdict::No) => answer(bytes),
-        [0xa5, ..] => {
-            let Some((body, code)) = bytes.get(..FRAME).and_then(<[u8]>::split_last_chunk::<4>)
-            else {
-                return Verdict::Need(FRAME);
-            };
-            let mut digest = CRC.digest();
-            digest.update(body);
-            digest.update(&[0; 3]);
-            if digest.finalize() == u32::from_le_bytes(*code) {
-                Verdict::Frame(FRAME)
-            } else {
-                Verdict::CheckFailed
-            }
-        }
-        _ => Verdict::No,
     }
 }
 

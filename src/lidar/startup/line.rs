@@ -11,7 +11,7 @@
 use super::{Action, StartConfig, StartError, send};
 use crate::lidar::framing::{Framer, Verdict};
 use crate::lidar::scip::command::{self, Parameters, Part, Replies};
-use crate::lidar::sick;
+use crate::lidar::{Layout as _, sick};
 
 /// Whose language is spoken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -114,11 +114,13 @@ impl Line {
                 _ => {}
             },
             Tongue::Sick => {
-                let telegram = self.telegrams.push(byte, |bytes| match sick::judge(bytes) {
-                    // Measurements of a stream that still runs.
-                    Verdict::Need(length) if length > 16 => Verdict::No,
-                    verdict => verdict,
-                });
+                let telegram =
+                    self.telegrams
+                        .push(byte, |bytes| match sick::Telegrams::judge(bytes) {
+                            // Measurements of a stream that still runs.
+                            Verdict::Need(length) if length > 16 => Verdict::No,
+                            verdict => verdict,
+                        });
                 let answer = telegram.and_then(|telegram| telegram.bytes.get(4).copied());
                 self.answered |= answer == Some(sick::MODE_ANSWER);
             }

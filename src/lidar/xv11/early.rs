@@ -28,7 +28,14 @@ impl Layout for Frames {
     const QUALITY_SHIFT: u8 = 4;
 
     fn judge(bytes: &[u8]) -> Verdict {
-        judge(bytes)
+        const SYNC: [u8; 4] = [0x5a, 0xa5, 0x00, 0xc0];
+        match bytes.get(..4) {
+            Some(start) if start != SYNC => Verdict::No,
+            None if !SYNC.starts_with(bytes) => Verdict::No,
+            None => Verdict::Need(bytes.len() + 1),
+            Some(_) if bytes.len() < FRAME => Verdict::Need(FRAME),
+            Some(_) => Verdict::Frame(FRAME),
+        }
     }
 
     fn packet(frame: &[u8], context: Context<'_>) -> Option<Packet> {
@@ -42,18 +49,6 @@ impl Layout for Frames {
             view: context.view(&fan, period_q8),
             fan,
         })
-    }
-}
-
-/// Turns among other bytes.
-pub(in crate::lidar) fn judge(bytes: &[u8]) -> Verdict {
-    const SYNC: [u8; 4] = [0x5a, 0xa5, 0x00, 0xc0];
-    match bytes.get(..4) {
-        Some(start) if start != SYNC => Verdict::No,
-        None if !SYNC.starts_with(bytes) => Verdict::No,
-        None => Verdict::Need(bytes.len() + 1),
-        Some(_) if bytes.len() < FRAME => Verdict::Need(FRAME),
-        Some(_) => Verdict::Frame(FRAME),
     }
 }
 
