@@ -212,6 +212,13 @@ fn ldrobot_commands() {
             let bytes = bytes(&vector);
             let (code, body) = bytes.split_last().expect("bytes");
             assert_eq!(ld06::check_code(body), *code, "{}", vector["id"]);
+            let encoded = match vector["id"].as_str().expect("id") {
+                "ld14p-start" => ld06::START,
+                "ld14p-stop" => ld06::STOP,
+                "ld14p-speed-2160dps" => ld06::set_speed(2160),
+                id => panic!("unknown command {id}"),
+            };
+            assert_eq!(encoded[..], bytes);
         }
     }
 }

@@ -30,6 +30,15 @@ pub const START: [u8; 8] = [0x54, 0xa0, 0x04, 0, 0, 0, 0, 0x5e];
 /// Stops them.
 pub const STOP: [u8; 8] = [0x54, 0xa1, 0x04, 0, 0, 0, 0, 0x4a];
 
+/// Sets the LD14P's speed (deg/s; 720 to 2880).
+#[must_use]
+pub fn set_speed(deg_per_s: u16) -> [u8; 8] {
+    let [low, high] = deg_per_s.to_le_bytes();
+    let body = [0x54, 0xa2, 0x04, low, high, 0, 0];
+    let [a, b, c, d, e, f, g] = body;
+    [a, b, c, d, e, f, g, check_code(&body)]
+}
+
 const STAMP_WRAP_MS: u16 = 30_000;
 const CRC: Crc<u8> = Crc::<u8>::new(&Algorithm {
     width: 8,
@@ -324,6 +333,14 @@ pub(super) mod tests {
         assert_eq!((first.range.mm(), first.quality), (Ok(224), 0xe4));
         assert_eq!(last.time_us - first.time_us, 11 * 1_000_000 / 4500);
         assert_eq!(packet.turn_start(), None);
+    }
+
+    #[test]
+    fn commands_as_documented() {
+        assert_eq!(set_speed(2160), [0x54, 0xa2, 4, 0x70, 8, 0, 0, 0xa1]);
+        for command in [START, STOP] {
+            assert_eq!(check_code(&command), 0);
+        }
     }
 
     #[test]

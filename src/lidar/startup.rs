@@ -20,7 +20,7 @@ use super::rplidar::command::{
     GET_HEALTH, GET_INFO, Health, Info, LONGEST_REQUEST, MOTOR_PWM, RESET, SCAN, STOP,
 };
 use super::scip::command::{Parameters, measure};
-use super::{Family, Model, coin_d4, ld06, lds01, model::Motor, sick};
+use super::{Family, Model, coin_d4, ld06, lds01, model::Motor, sick, ydlidar};
 use line::{Line, Tongue};
 
 /// Whose language the sensor speaks.
@@ -302,7 +302,7 @@ impl Startup {
                 self.since_us = Some(now_us);
                 match self.dialect {
                     // The first two bytes wake it up.
-                    Dialect::Ydlidar => send(&[&[0xa5, 0x00, 0xa5, 0x65]]),
+                    Dialect::Ydlidar => send(&[&[0xa5, 0x00, 0xa5, ydlidar::command::STOP]]),
                     _ => self.request(STOP, &[]),
                 }
             }
@@ -313,7 +313,11 @@ impl Startup {
             }
             (Step::Reset, None) => {
                 self.since_us = Some(now_us);
-                self.request(if self.is_ydlidar() { 0x80 } else { RESET }, &[])
+                let reset = match self.dialect {
+                    Dialect::Ydlidar => ydlidar::command::RESET,
+                    _ => RESET,
+                };
+                self.request(reset, &[])
             }
             (Step::Reset, Some(waited)) if waited >= self.config.reset_ms => {
                 self.go(Step::Stop);
@@ -412,12 +416,15 @@ impl Startup {
 
     fn command(&self) -> u8 {
         match (self.step, self.dialect) {
-            (Step::Info, Dialect::Ydlidar) => 0x90,
+            (Step::Info, Dialect::Ydlidar) => ydlidar::command::GET_INFO,
             (Step::Info, _) => GET_INFO,
             // Manuals and the maker's SDK disagree on the command.
-            (Step::Health, Dialect::Ydlidar) => 0x91 + (self.tries & 1),
+            (Step::Health, Dialect::Ydlidar) if self.tries & 1 == 1 => {
+                ydlidar::command::GET_HEALTH_TOO
+            }
+            (Step::Health, Dialect::Ydlidar) => ydlidar::command::GET_HEALTH,
             (Step::Health, _) => GET_HEALTH,
-            (Step::Scan, Dialect::Ydlidar) => 0x60,
+            (Step::Scan, Dialect::Ydlidar) => ydlidar::command::SCAN,
             (Step::Scan, _) if self.scan_mode.is_some() => EXPRESS_SCAN,
             (Step::Scan, _) => SCAN,
             _ => GET_CONF,

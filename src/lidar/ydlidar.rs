@@ -27,6 +27,34 @@ pub const MOST_SAMPLES: usize = 80;
 /// Bytes of the longest frame.
 pub const FRAME: usize = 10 + 4 * MOST_SAMPLES;
 
+/// Commands; each goes behind `0xA5`, as [`rplidar::command::request`] writes it, and is answered as there.
+pub mod command {
+    /// Starts the scan.
+    pub const SCAN: u8 = 0x60;
+    /// Starts it whatever the motor does.
+    pub const FORCE_SCAN: u8 = 0x61;
+    /// Ends it.
+    pub const STOP: u8 = 0x65;
+    /// Restarts the sensor.
+    pub const RESET: u8 = 0x80;
+    /// Asks for model, firmware, serial number.
+    pub const GET_INFO: u8 = 0x90;
+    /// Asks for the health, by the manuals.
+    pub const GET_HEALTH: u8 = 0x91;
+    /// Asks for the health, by the maker's software.
+    pub const GET_HEALTH_TOO: u8 = 0x92;
+    /// A tenth of a turn a second faster.
+    pub const FASTER: u8 = 0x09;
+    /// A tenth of a turn a second slower.
+    pub const SLOWER: u8 = 0x0a;
+    /// A turn a second faster.
+    pub const MUCH_FASTER: u8 = 0x0b;
+    /// A turn a second slower.
+    pub const MUCH_SLOWER: u8 = 0x0c;
+    /// Asks for the speed.
+    pub const GET_SPEED: u8 = 0x0d;
+}
+
 /// How a model's samples are to be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -185,6 +185,17 @@ impl Health {
     }
 }
 
+/// Times from one measurement to the next (µs) in standard and in express scan, from an answer of type `0x15`.
+#[must_use]
+pub fn sample_periods_us(answer: &Answer) -> Option<(u16, u16)> {
+    match (answer.kind, &answer.payload[..]) {
+        (0x15, &[s0, s1, e0, e1]) => {
+            Some((u16::from_le_bytes([s0, s1]), u16::from_le_bytes([e0, e1])))
+        }
+        _ => None,
+    }
+}
+
 /// An entry of the configuration: its type and its first 32 bits.
 #[must_use]
 pub fn conf(answer: &Answer) -> Option<(u32, u32)> {
@@ -236,6 +247,9 @@ mod tests {
             code: 0x1234,
         };
         assert_eq!(health, Some(expected));
+        let rates = answer(&[0xa5, 0x5a, 4, 0, 0, 0, 0x15, 0xf4, 0x01, 0xfa, 0]);
+        let periods = rates.and_then(|answer| sample_periods_us(&answer));
+        assert_eq!(periods, Some((500, 250)));
         let scan = answer(&[0xa5, 0x5a, 0x05, 0, 0, 0x40, 0x81]).expect("answer");
         assert!(scan.streams && scan.kind == 0x81);
     }
