@@ -9,8 +9,9 @@ use crate::{
 
 /// A lidar's pose on a grid. Coordinates are cells in `Q shift`, modulo 2³².
 ///
-/// `shift` makes the rotation's entries 15 bits long, so they turn points by at most 0.0018° too far, and lets
-/// coordinates reach from 65 to 131 m either way.
+/// There are [`COARSE`](Self::COARSE) binary places, so that coordinates reach 4096 cells, or [`FINE`](Self::FINE) in
+/// grids of small cells, whose coordinates reach eight times as many. The rotation's entries are rounded to these
+/// places: a point 8 m away is off by at most 0.006 cells, in grids of small cells by 0.05.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Placement {
     /// Where the lidar is.
@@ -21,11 +22,16 @@ pub struct Placement {
     pub cos: i32,
     /// Cells per millimetre times the heading's sine.
     pub sin: i32,
-    /// Binary places of a coordinate.
+    /// Binary places of a coordinate: one of two, so that loops are compiled for each.
     pub shift: u32,
 }
 
 impl Placement {
+    /// Binary places where cells are 3.5 cm or larger.
+    pub const COARSE: u32 = 20;
+    /// Binary places where cells are smaller.
+    pub const FINE: u32 = 17;
+
     /// Farthest that a point may be from its lidar (mm): its coordinates have 16 bits.
     const REACH_MM: f32 = 46_400.0;
 
@@ -101,14 +107,13 @@ impl Placement {
     }
 }
 
-/// Binary places with which a millimetre is 2¹⁴ to 2¹⁵ units.
+/// Binary places of coordinates on a grid.
 fn shift(shape: &Shape) -> u32 {
-    let cell_mm = shape.resolution() * 1000.0;
-    let mut shift = 16;
-    while shift < 26 && (2u32 << shift) as f32 <= 32_767.0 * cell_mm {
-        shift += 1;
+    if shape.resolution() >= 0.035 {
+        Placement::COARSE
+    } else {
+        Placement::FINE
     }
-    shift
 }
 
 #[cfg(test)]
@@ -131,7 +136,8 @@ mod tests {
                     pose * Point::new(f32::from(point.x) * 1e-3, f32::from(point.y) * 1e-3),
                 );
                 let off = |got: u32, want: f32| (got as i32 as f32 / one - want).abs();
-                let allowed = 0.0003 / resolution;
+                // Half a unit of each entry for each millimetre, and what single precision leaves.
+                let allowed = 1.5 * f32::from(point.range) / (2.0 * one) + 0.001;
                 assert!(
                     off(place.0, expected.x) < allowed && off(place.1, expected.y) < allowed,
                     "{resolution} {point:?}: {place:?}"
