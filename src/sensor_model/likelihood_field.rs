@@ -243,7 +243,8 @@ pub trait Field {
     /// Sums around the ends of neighbouring beams, those on bytes of at least `gate`: for each group of at most
     /// [`patch::GROUP`] beams.
     ///
-    /// Beams that end in the field's outermost cells or off it count as nothing. Other beams are counted if `beside`.
+    /// Beams that end in the field's outermost cells or off it count as nothing. Curvatures and
+    /// other beams are summed if `curved`.
     fn patches<'p>(
         &self,
         groups: impl Iterator<Item = &'p [ScanPoint]>,
@@ -396,11 +397,11 @@ impl Field for LikelihoodField<&[u8]> {
         &self,
         groups: impl Iterator<Item = &'p [ScanPoint]>,
         placement: &Placement,
-        (gate, beside): (u8, bool),
+        (gate, curved): (u8, bool),
         mut each: impl FnMut(&Patch),
     ) {
         let (cells, width) = (self.grid.cells(), self.grid.shape().width());
-        let mut table = Table::new(cells, width, self.scale.unexplored, placement, gate, beside);
+        let mut table = Table::new(cells, width, self.scale.unexplored, placement, gate, curved);
         for group in groups {
             each(&table.patch(group));
         }

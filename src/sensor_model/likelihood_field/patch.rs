@@ -14,7 +14,7 @@ pub const GROUP: usize = 16;
 pub struct Patch {
     /// Slopes of the bytes along columns and rows where the beams end (256ths of a byte per cell).
     pub slope: [i32; 2],
-    /// Their curvatures (bytes per cell²): xx, xy, yy.
+    /// Their curvatures (bytes per cell²): xx, xy, yy. Only where asked for.
     pub curvature: [i32; 3],
     /// Bytes of the cells in which they end.
     pub bytes: u32,
@@ -24,7 +24,7 @@ pub struct Patch {
     pub y: i32,
     /// Beams summed.
     pub inliers: u32,
-    /// Other beams that end in explored cells; counted where asked for.
+    /// Other beams that end in explored cells; only where curvatures are asked for.
     pub beside: u32,
 }
 
@@ -40,29 +40,22 @@ struct Around {
 }
 
 impl Patch {
-    /// Adds a beam that ends `x` and `y` from its cell's lower left corner (256ths of a cell).
-    ///
-    /// The slopes are those at the corner until [`Patch::from_corners`].
+    /// Adds a beam that ends `x` and `y` from its cell's middle (256ths of a cell), with `CURVED` its curvatures too.
     #[inline]
-    fn add(&mut self, cell: &Around, x: i32, y: i32) {
+    fn add<const CURVED: bool>(&mut self, cell: &Around, x: i32, y: i32) {
         let xx = cell.left + cell.right - 2 * cell.here;
         let yy = cell.below + cell.above - 2 * cell.here;
         let xy = cell.corner - cell.above - cell.right + cell.here;
         let [gx, gy] = &mut self.slope;
         *gx += ((cell.right - cell.left) << 7) + xx * x + xy * y;
         *gy += ((cell.above - cell.below) << 7) + yy * y + xy * x;
-        let [sxx, sxy, syy] = &mut self.curvature;
-        *sxx += xx;
-        *sxy += xy;
-        *syy += yy;
+        if CURVED {
+            let [sxx, sxy, syy] = &mut self.curvature;
+            *sxx += xx;
+            *sxy += xy;
+            *syy += yy;
+        }
         self.bytes += cell.here as u32;
-    }
-
-    /// Half a cell back, all at once: slopes are known in the middles of the cells.
-    fn from_corners(&mut self) {
-        let [xx, xy, yy] = self.curvature;
-        self.slope[0] -= 128 * (xx + xy);
-        self.slope[1] -= 128 * (yy + xy);
     }
 }
 
@@ -99,13 +92,12 @@ pub(super) fn by_cells<F: Field + ?Sized>(
             above: at(x, y + 1),
             corner: at(x + 1, y + 1),
         };
-        let part = |place: u32| ((place >> ((placement.shift - 8) & 31)) & 255) as i32;
-        patch.add(&cell, part(px), part(py));
+        let part = |place: u32| ((place >> ((placement.shift - 8) & 31)) & 255) as i32 - 128;
+        patch.add::<true>(&cell, part(px), part(py));
         patch.x += x as i32;
         patch.y += y as i32;
         patch.inliers += 1;
     }
-    patch.from_corners();
     patch
 }
 
@@ -115,8 +107,8 @@ pub(super) struct Table<'a> {
     width: u16,
     unexplored: u8,
     gate: u8,
-    /// Whether other beams are counted.
-    beside: bool,
+    /// Whether curvatures are asked for.
+    curved: bool,
     /// Seen from the second cell of the second row, which is the first with all neighbours.
     placement: Placement,
     /// Where the beams of a group end.
@@ -133,7 +125,7 @@ impl<'a> Table<'a> {
         unexplored: u8,
         placement: &Placement,
         gate: u8,
-        beside: bool,
+        curved: bool,
     ) -> Self {
         let one = 1 << (placement.shift & 31);
         Self {
@@ -141,7 +133,7 @@ impl<'a> Table<'a> {
             width,
             unexplored,
             gate,
-            beside,
+            curved,
             placement: Placement {
                 x: placement.x.wrapping_sub(one),
                 y: placement.y.wrapping_sub(one),
@@ -164,14 +156,18 @@ impl<'a> Table<'a> {
         };
         let [count, y] = found.unwrap_or_default();
         let kept = self.kept.get(..count as usize).unwrap_or(&[]);
-        let (mut patch, total) = sums(cells, width, kept).unwrap_or_default();
-        patch.from_corners();
+        let found = if self.curved {
+            sums::<true>(cells, width, kept)
+        } else {
+            sums::<false>(cells, width, kept)
+        };
+        let (mut patch, total) = found.unwrap_or_default();
         // From the second of the second row on.
         let x = total.wrapping_sub(y.wrapping_mul(u32::from(width)));
         patch.x = x.wrapping_add(count) as i32;
         patch.y = y.wrapping_add(count) as i32;
         patch.inliers = count;
-        if self.beside && kept.len() < places.len() {
+        if self.curved && kept.len() < places.len() {
             patch.beside = self.explored(places).saturating_sub(count);
         }
         patch
@@ -210,9 +206,10 @@ fn sort_out<const SHIFT: u32>(
         let cell = row.wrapping_mul(width).wrapping_add(x >> SHIFT);
         match here.get(cell as usize) {
             Some(&byte) if x < span && byte >= gate => {
+                // From the lower left corner; with the upper bit turned, a signed byte from the middle.
                 let part = |place: u32| (place >> (SHIFT - 8)) & 255;
                 if let Some(place) = kept.get_mut(count as usize % GROUP) {
-                    *place = (cell, part(x) | (part(y) << 16));
+                    *place = (cell, (part(x) | (part(y) << 16)) ^ 0x80_0080);
                 }
                 rows += row;
                 count += 1;
@@ -236,7 +233,7 @@ fn place(placement: &Placement, points: &[ScanPoint], places: &mut [(u32, u32); 
 ///
 /// Cells are counted from the second of the second row. `None` for a table that has none such.
 #[inline(never)]
-fn sums(cells: &[u8], width: u16, kept: &[(u32, u32)]) -> Option<(Patch, u32)> {
+fn sums<const CURVED: bool>(cells: &[u8], width: u16, kept: &[(u32, u32)]) -> Option<(Patch, u32)> {
     let row = usize::from(width);
     // Three slices that one index serves, and one check: the first is the shortest.
     let inner = cells.len().checked_sub(2 * row + 2)?;
@@ -257,7 +254,8 @@ fn sums(cells: &[u8], width: u16, kept: &[(u32, u32)]) -> Option<(Patch, u32)> {
                 above: at(above, k),
                 corner: at(above, k + 1),
             };
-            patch.add(&around, (part & 255) as i32, (part >> 16) as i32);
+            let signed = |byte: u32| i32::from(byte as i8);
+            patch.add::<CURVED>(&around, signed(part), signed(part >> 16));
         }
     }
     Some((patch, total))
