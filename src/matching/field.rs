@@ -11,7 +11,11 @@ use crate::{
     linalg::{Covariance, Information, Sym3},
     math,
     scan::points::ScanPoint,
-    sensor_model::likelihood_field::{Field, patch::{GROUP, Patch}, placement::Placement},
+    sensor_model::likelihood_field::{
+        Field,
+        patch::{GROUP, Patch},
+        placement::Placement,
+    },
 };
 
 /// When to stop, and what to believe.
@@ -180,10 +184,7 @@ impl Sums {
             pivot,
             ..Self::default()
         };
-        let pass = Pass {
-            lever_shift,
-            pivot,
-        };
+        let pass = Pass { lever_shift, pivot };
         let curved = known.is_none();
         let each = |patch: &Patch| pass.add(patch, curved, &mut sums);
         // Some beams from all around: the first few of each group.
@@ -401,7 +402,10 @@ impl Pass {
         if curved {
             sums.overlap += (patch.inliers + patch.beside) as u16;
         }
-        let Some(&share) = SHARES.get(patch.inliers as usize).filter(|&&share| share > 0) else {
+        let Some(&share) = SHARES
+            .get(patch.inliers as usize)
+            .filter(|&&share| share > 0)
+        else {
             return;
         };
         sums.bytes += patch.bytes;
@@ -411,10 +415,7 @@ impl Pass {
         let lever = |cells: i32, pivot: i32| {
             (((cells * share) >> 12) - pivot + half) >> (self.lever_shift & 31)
         };
-        let (lx, ly) = (
-            lever(patch.x, self.pivot.0),
-            lever(patch.y, self.pivot.1),
-        );
+        let (lx, ly) = (lever(patch.x, self.pivot.0), lever(patch.y, self.pivot.1));
         // Shifted so that the sums over a thousand beams fit, whatever is in the field.
         let slopes = [gx, gy, (gy * lx - gx * ly) >> 6];
         for (total, part) in sums.slope.iter_mut().zip(slopes) {

@@ -393,6 +393,21 @@ impl Field for LikelihoodField<&[u8]> {
         }
     }
 
+    fn sum(&self, points: &[ScanPoint], placement: &Placement) -> u32 {
+        let (cells, width) = (self.grid.cells(), self.grid.shape().width());
+        let mut sum = 0;
+        // So many that their sum and number fit in a word.
+        for points in points.chunks(2048) {
+            let (bytes, beams) = if placement.shift == Placement::COARSE {
+                table_sum::<{ Placement::COARSE }>(cells, width, points, placement)
+            } else {
+                table_sum::<{ Placement::FINE }>(cells, width, points, placement)
+            };
+            sum += bytes + (points.len() as u32 - beams) * u32::from(self.scale.unexplored);
+        }
+        sum
+    }
+
     fn patches<'p>(
         &self,
         groups: impl Iterator<Item = &'p [ScanPoint]>,
@@ -406,4 +421,32 @@ impl Field for LikelihoodField<&[u8]> {
             each(&table.patch(group));
         }
     }
+}
+
+/// Sum of the bytes in which points end, and how many end on the table.
+#[inline(never)]
+fn table_sum<const SHIFT: u32>(
+    cells: &[u8],
+    width: u16,
+    points: &[ScanPoint],
+    placement: &Placement,
+) -> (u32, u32) {
+    let (placement, width) = (*placement, u32::from(width));
+    let span = width << SHIFT;
+    // The number counts in the upper bits, so that one register holds both.
+    let mut sum = 0u32;
+    let mut add = |point: &ScanPoint| {
+        let (x, y) = placement.place(point);
+        // Rows and columns below 2¹⁵: the product cannot wrap, and a row off the table is off it.
+        let cell = (y >> SHIFT).wrapping_mul(width).wrapping_add(x >> SHIFT);
+        if let Some(&byte) = cells.get(cell as usize).filter(|_| x < span) {
+            sum = sum.wrapping_add(u32::from(byte)).wrapping_add(1 << 20);
+        }
+    };
+    let fours = points.chunks_exact(4);
+    fours.remainder().iter().for_each(&mut add);
+    for four in fours {
+        four.iter().for_each(&mut add);
+    }
+    (sum & 0xf_ffff, sum >> 20)
 }

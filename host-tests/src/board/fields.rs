@@ -187,4 +187,3 @@ fn input(scene: &Scene) -> Vec<u8> {
     }
     bytes
 }
-pub fn debug_scene() -> (LikelihoodField<Vec<u8>>, Vec<ScanPoint>, Pose) { let s = scene().unwrap(); (s.field, s.points, s.guess) }
