@@ -11,11 +11,7 @@ use crate::{
     linalg::{Covariance, Information, Sym3},
     math,
     scan::points::ScanPoint,
-    sensor_model::likelihood_field::{
-        Field,
-        patch::{GROUP, Patch},
-        placement::Placement,
-    },
+    sensor_model::likelihood_field::{Field, placement::Placement},
 };
 
 /// When to stop, and what to believe.
@@ -27,7 +23,7 @@ pub struct FieldConfig {
     pub translation_tolerance: f32,
     /// And turning less than this (rad). Default 0.0001.
     pub rotation_tolerance: f32,
-    /// While far off, every so-many-th beam is enough: of groups of 16, one part in so many. Default 4.
+    /// While far off, every so-many-th beam is enough. Default 4.
     pub coarse_stride: u8,
     /// In the end only beams so near to a surface count (m). Default 0.05: five times a range's noise. What
     /// one scan sees and the other does not would pull.
@@ -68,7 +64,7 @@ impl Default for FieldConfig {
 ///
 /// From 2.5σ and a few degrees off: start from a search or a coarser field otherwise.
 /// A direction that the scene hardly determines keeps the guess and is named in [`Match::weak`].
-pub fn align<F: Field>(
+pub fn align<F: Field + ?Sized>(
     field: &F,
     points: &[ScanPoint],
     guess: Pose,
@@ -135,10 +131,10 @@ pub fn align<F: Field>(
 /// Slopes and curvatures summed over the beams, in bytes, cells and levers of `2^lever_shift` cells.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
-    /// 256ths of a byte per cell; quarters per lever.
-    slope: [i32; 3],
-    /// Bytes per cell²: xx, xy, yy, xt, yt; 64 bytes per lever²: tt.
-    curvature: [i32; 6],
+    /// 64ths of a byte per cell, and per lever.
+    slope: [i64; 3],
+    /// Bytes per cell²: xx, xy, yy, xt, yt, tt.
+    curvature: [i64; 6],
     /// Over the inliers.
     bytes: u32,
     inliers: u16,
@@ -154,7 +150,7 @@ struct Sums {
 
 impl Sums {
     /// `None` for a pose out of the field's reach.
-    fn over<F: Field>(
+    fn over<F: Field + ?Sized>(
         field: &F,
         points: &[ScanPoint],
         pose: Pose,
@@ -164,12 +160,13 @@ impl Sums {
     ) -> Option<Self> {
         let placement = Placement::new(field.shape(), pose)?;
         let shape = field.shape();
-        // 32 m make at most 512 levers.
+        // 32 m make at most 256 levers.
         let reach = 32.8 / shape.resolution();
         let mut lever_shift = 0;
-        while reach > (512u32 << lever_shift) as f32 {
+        while reach > (256u32 << lever_shift) as f32 {
             lever_shift += 1;
         }
+        let fine = (placement.shift - 6) & 31;
         let inside = |place: u32, side: u16| {
             let cell = (place as i32 >> placement.shift).max(0);
             cell.min(i32::from(side) - 1)
@@ -184,15 +181,27 @@ impl Sums {
             pivot,
             ..Self::default()
         };
-        let pass = Pass { lever_shift, pivot };
-        let curved = known.is_none();
-        let each = |patch: &Patch| pass.add(patch, curved, &mut sums);
-        // Some beams from all around: the first few of each group.
-        let groups = points.chunks(GROUP).map(|group| {
-            let some = group.len().div_ceil(stride.max(1));
-            group.get(..some).unwrap_or(group)
-        });
-        field.patches(groups, &placement, (gate, curved), each);
+        let unexplored = field.scale().unexplored;
+        let passes = Pass {
+            fine,
+            lever_shift: (lever_shift + 6) & 31,
+            pivot: ((pivot.0 << 6) as u32, (pivot.1 << 6) as u32),
+            gate: i32::from(gate),
+            unexplored: i32::from(unexplored),
+            // Half a 64th of a cell, so that cutting the rest off rounds.
+            placement: Placement {
+                x: placement.x.wrapping_add(1 << ((placement.shift - 7) & 31)),
+                y: placement.y.wrapping_add(1 << ((placement.shift - 7) & 31)),
+                ..placement
+            },
+        };
+        for chunk in points.chunks((16 * stride).max(1)) {
+            let part = match known {
+                Some(_) => passes.sum::<F, false>(field, chunk, stride),
+                None => passes.sum::<F, true>(field, chunk, stride),
+            };
+            sums.add(&part);
+        }
         if let Some(known) = known {
             (sums.curvature, sums.overlap) = (known.curvature, known.overlap);
         }
@@ -205,6 +214,18 @@ impl Sums {
             }
         };
         Some(sums)
+    }
+
+    fn add(&mut self, part: &Part) {
+        for (total, part) in self.slope.iter_mut().zip(part.slope) {
+            *total += i64::from(part);
+        }
+        for (total, part) in self.curvature.iter_mut().zip(part.curvature) {
+            *total += i64::from(part);
+        }
+        self.bytes += part.bytes;
+        self.inliers += part.inliers as u16;
+        self.overlap += part.overlap as u16;
     }
 
     fn needed(&self, config: &FieldConfig, beams: usize) -> u16 {
@@ -221,21 +242,21 @@ impl Sums {
             xt,
             yy,
             yt,
-            tt: 64.0 * tt,
+            tt,
         }
         .theta_scaled(self.lever)
     }
 
     /// Curvature of one beam that meets a wall head-on: what its parabola loses one cell away.
-    fn wall<F: Field>(field: &F) -> f32 {
+    fn wall<F: Field + ?Sized>(field: &F) -> f32 {
         let cells = field.shape().resolution() / field.scale().sigma;
         cells * cells / field.scale().step
     }
 
     /// Newton step (cells, cells, rad).
     fn step(&self, config: &FieldConfig) -> Option<[f32; 3]> {
-        let [gx, gy, gt] = self.slope.map(|sum| sum as f32 / 256.0);
-        let slope = [gx, gy, 64.0 * gt * self.lever];
+        let [gx, gy, gt] = self.slope.map(|sum| sum as f32 / 64.0);
+        let slope = [gx, gy, gt * self.lever];
         let (lever, pairs) = self.axes;
         let strongest = pairs[2].0;
         if !(strongest > 0.0) {
@@ -301,7 +322,7 @@ impl Sums {
         above / (math::max(beams as f32, 1.0) * (255.0 - f32::from(unexplored)))
     }
 
-    fn summary<F: Field>(
+    fn summary<F: Field + ?Sized>(
         &self,
         field: &F,
         beams: usize,
@@ -369,7 +390,7 @@ impl Sums {
 }
 
 /// Byte from which on a beam counts, `distance` (m) from the nearest surface; above unexplored in any case.
-fn gate<F: Field>(field: &F, distance: f32) -> u8 {
+fn gate<F: Field + ?Sized>(field: &F, distance: f32) -> u8 {
     let scale = field.scale();
     let z = distance / scale.sigma;
     let byte = 255 - math::round_to_i32(math::min(0.5 * z * z / scale.step, 255.0));
@@ -378,55 +399,80 @@ fn gate<F: Field>(field: &F, distance: f32) -> u8 {
 
 /// What does not change during a pass.
 struct Pass {
-    /// Right shift from cells to levers.
+    placement: Placement,
+    /// Right shift to 64ths of a cell.
+    fine: u32,
+    /// And from there to levers.
     lever_shift: u32,
-    pivot: (i32, i32),
+    /// 64ths of a cell.
+    pivot: (u32, u32),
+    gate: i32,
+    unexplored: i32,
+}
+
+/// Sums over at most 16 beams, which fit in 32 bits: bytes' differences have 9 bits and a sign, levers 8.
+#[derive(Default)]
+struct Part {
+    slope: [i32; 3],
+    curvature: [i32; 6],
+    bytes: u32,
+    inliers: u32,
+    overlap: u32,
 }
 
 impl Pass {
-    /// Adds a group of neighbouring beams to the slopes, and if `curved` to the curvatures.
-    ///
-    /// A group has its mean lever: the beams' own differ by less than its width.
+    /// Slopes, and with `CURVED` the curvatures too.
     #[inline(never)]
-    fn add(&self, patch: &Patch, curved: bool, sums: &mut Sums) {
-        /// 4096 over a number of inliers.
-        const SHARES: [i32; GROUP + 1] = {
-            let mut shares = [0; GROUP + 1];
-            let mut n = 1;
-            while n <= GROUP {
-                shares[n] = 4096 / n as i32;
-                n += 1;
+    fn sum<F: Field + ?Sized, const CURVED: bool>(
+        &self,
+        field: &F,
+        points: &[ScanPoint],
+        stride: usize,
+    ) -> Part {
+        let mut part = Part::default();
+        let [mut gx, mut gy, mut gt] = part.slope;
+        let [mut sxx, mut sxy, mut syy, mut sxt, mut syt, mut stt] = part.curvature;
+        let (mut bytes, mut inliers, mut beside) = (0, 0, 0);
+        for point in points.iter().step_by(stride.max(1)) {
+            let (px, py) = self.placement.place(point);
+            let (fx, fy) = (px >> self.fine, py >> self.fine);
+            let Some(cells) = field.around(fx >> 6, fy >> 6) else {
+                continue;
+            };
+            if cells.here < self.gate {
+                if CURVED {
+                    beside += u32::from(cells.here != self.unexplored);
+                }
+                continue;
             }
-            shares
-        };
-        if curved {
-            sums.overlap += (patch.inliers + patch.beside) as u16;
-        }
-        let Some(&share) = SHARES
-            .get(patch.inliers as usize)
-            .filter(|&&share| share > 0)
-        else {
-            return;
-        };
-        sums.bytes += patch.bytes;
-        sums.inliers += patch.inliers as u16;
-        let ([gx, gy], [xx, xy, yy]) = (patch.slope, patch.curvature);
-        let half = (1 << (self.lever_shift & 31)) >> 1;
-        let lever = |cells: i32, pivot: i32| {
-            (((cells * share) >> 12) - pivot + half) >> (self.lever_shift & 31)
-        };
-        let (lx, ly) = (lever(patch.x, self.pivot.0), lever(patch.y, self.pivot.1));
-        // Shifted so that the sums over a thousand beams fit, whatever is in the field.
-        let slopes = [gx, gy, (gy * lx - gx * ly) >> 6];
-        for (total, part) in sums.slope.iter_mut().zip(slopes) {
-            *total = total.wrapping_add(part);
-        }
-        if curved {
-            let (xt, yt) = (xy * lx - xx * ly, yy * lx - xy * ly);
-            let tt = ((yt >> 3) * lx - (xt >> 3) * ly) >> 3;
-            for (total, part) in sums.curvature.iter_mut().zip([xx, xy, yy, xt, yt, tt]) {
-                *total = total.wrapping_add(part);
+            let (dx, dy) = ((fx & 63) as i32, (fy & 63) as i32);
+            let (bx, by) = (cells.here - cells.left, cells.here - cells.below);
+            let (ax, ay) = (cells.right - cells.here, cells.above - cells.here);
+            let (xx, yy) = (ax - bx, ay - by);
+            let xy = cells.corner - cells.above - ax;
+            // The slope half a cell before the middle, and from there on.
+            let slope_x = (bx << 6) + xx * dx + xy * (dy - 32);
+            let slope_y = (by << 6) + yy * dy + xy * (dx - 32);
+            let lx = (fx.wrapping_sub(self.pivot.0) as i32) >> self.lever_shift;
+            let ly = (fy.wrapping_sub(self.pivot.1) as i32) >> self.lever_shift;
+            gx += slope_x;
+            gy += slope_y;
+            gt += slope_y * lx - slope_x * ly;
+            if CURVED {
+                let (xt, yt) = (xy * lx - xx * ly, yy * lx - xy * ly);
+                sxx += xx;
+                sxy += xy;
+                syy += yy;
+                sxt += xt;
+                syt += yt;
+                stt += yt * lx - xt * ly;
             }
+            bytes += cells.here as u32;
+            inliers += 1;
         }
+        (part.bytes, part.inliers, part.overlap) = (bytes, inliers, inliers + beside);
+        part.slope = [gx, gy, gt];
+        part.curvature = [sxx, sxy, syy, sxt, syt, stt];
+        part
     }
 }

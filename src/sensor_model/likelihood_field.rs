@@ -5,7 +5,6 @@
 //! that ends far from all. An unexplored cell, and every place off the map, is worth `1 / z_max`; the byte
 //! that stands for this ([`Scale::unexplored`]) is reserved, so unexplored cells need no test in a sum.
 
-pub mod patch;
 pub mod placement;
 pub mod stamp;
 pub mod stored;
@@ -18,7 +17,6 @@ use crate::{
     math,
     scan::points::ScanPoint,
 };
-use patch::{Patch, Table};
 use placement::Placement;
 
 /// Numbers of table 6.3.
@@ -229,6 +227,23 @@ impl Score {
     }
 }
 
+/// A cell's byte with those beside it.
+#[derive(Debug, Clone, Copy)]
+pub struct Around {
+    /// The cell's own.
+    pub here: i32,
+    /// One column less.
+    pub left: i32,
+    /// One column more.
+    pub right: i32,
+    /// One row less.
+    pub below: i32,
+    /// One row more.
+    pub above: i32,
+    /// One column and one row more.
+    pub corner: i32,
+}
+
 /// Cells that beams can be looked up in: a whole table, or tiles.
 pub trait Field {
     /// Size, resolution and place.
@@ -240,22 +255,8 @@ pub trait Field {
     /// The byte in column `x` and row `y`, that of unexplored cells off the field.
     fn byte(&self, x: u32, y: u32) -> u8;
 
-    /// Sums around the ends of neighbouring beams, those on bytes of at least `gate`: for each group of at most
-    /// [`patch::GROUP`] beams.
-    ///
-    /// Beams that end in the field's outermost cells or off it count as nothing. Curvatures and
-    /// other beams are summed if `curved`.
-    fn patches<'p>(
-        &self,
-        groups: impl Iterator<Item = &'p [ScanPoint]>,
-        placement: &Placement,
-        (gate, _): (u8, bool),
-        mut each: impl FnMut(&Patch),
-    ) {
-        for group in groups {
-            each(&patch::by_cells(self, group, placement, gate));
-        }
-    }
+    /// The byte with its neighbours; `None` at the edge and off the field.
+    fn around(&self, x: u32, y: u32) -> Option<Around>;
 
     /// Sum of the bytes that `points` end in.
     fn sum(&self, points: &[ScanPoint], placement: &Placement) -> u32 {
@@ -408,18 +409,26 @@ impl Field for LikelihoodField<&[u8]> {
         sum
     }
 
-    fn patches<'p>(
-        &self,
-        groups: impl Iterator<Item = &'p [ScanPoint]>,
-        placement: &Placement,
-        (gate, curved): (u8, bool),
-        mut each: impl FnMut(&Patch),
-    ) {
-        let (cells, width) = (self.grid.cells(), self.grid.shape().width());
-        let mut table = Table::new(cells, width, self.scale.unexplored, placement, gate, curved);
-        for group in groups {
-            each(&table.patch(group));
+    #[inline]
+    fn around(&self, x: u32, y: u32) -> Option<Around> {
+        let width = usize::from(self.grid.shape().width());
+        if x.wrapping_sub(1) >= (width as u32).wrapping_sub(2) {
+            return None;
         }
+        let index = (y as usize).wrapping_mul(width).wrapping_add(x as usize);
+        // The rows below, of and above the cell: whether the corner is on the table says it for all six.
+        let rows = self.grid.cells().get(index.wrapping_sub(width)..)?;
+        let &corner = rows.get(2 * width + 1)?;
+        let (&below, &left, &here) = (rows.first()?, rows.get(width - 1)?, rows.get(width)?);
+        let (&right, &above) = (rows.get(width + 1)?, rows.get(2 * width)?);
+        Some(Around {
+            here: i32::from(here),
+            left: i32::from(left),
+            right: i32::from(right),
+            below: i32::from(below),
+            above: i32::from(above),
+            corner: i32::from(corner),
+        })
     }
 }
 

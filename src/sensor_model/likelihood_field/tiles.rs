@@ -1,6 +1,6 @@
 //! A field that rolls along with the robot: a square window of tiles, of which only those near surfaces take memory.
 
-use super::{Field, Scale, stamp::Canvas};
+use super::{Around, Field, Scale, stamp::Canvas};
 use crate::{
     geometry::{Point, Pose},
     grid::{GridError, Shape},
@@ -237,6 +237,22 @@ impl<const T: usize, const I: usize> Field for Tiles<T, I> {
             .and_then(|cells| cells.get(cell))
             .copied()
             .unwrap_or(self.scale.unexplored)
+    }
+
+    fn around(&self, x: u32, y: u32) -> Option<Around> {
+        let last = u32::from(self.shape.width()) - 1;
+        if x == 0 || y == 0 || x >= last || y >= last {
+            return None;
+        }
+        let at = |x: u32, y: u32| i32::from(self.byte(x, y));
+        Some(Around {
+            here: at(x, y),
+            left: at(x - 1, y),
+            right: at(x + 1, y),
+            below: at(x, y - 1),
+            above: at(x, y + 1),
+            corner: at(x + 1, y + 1),
+        })
     }
 }
 
