@@ -30,6 +30,7 @@
 //! the unit, and copy the [`Model`] with `counter_clockwise` and `zero_cdeg` as found.
 
 pub mod camsense;
+pub mod choice;
 pub mod coin_d4;
 pub mod delta;
 pub mod framing;

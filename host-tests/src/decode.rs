@@ -2,10 +2,8 @@
 
 use std::fmt;
 
-use beamfix::lidar::{
-    Counters, Family, Model, Packet, Protocol, camsense, coin_d4, delta, identify, ld06, lds01,
-    rplidar, scip, sick, xv11, ydlidar,
-};
+pub use beamfix::lidar::choice::{WithParser, with_parser};
+use beamfix::lidar::{Counters, Family, Model, Packet, Protocol, identify};
 use beamfix::scan::Beam;
 
 use crate::timed::{self, Content};
@@ -96,37 +94,6 @@ pub fn model(name: &str, bytes: &[u8]) -> Result<&'static Model, DecodeError> {
                 hints.map(|hint| hint.to_string()).collect(),
             ))
         }
-    }
-}
-
-/// What to do with a parser, whichever it is.
-pub trait WithParser {
-    /// What comes of it.
-    type Output;
-
-    /// Does it with a parser of `model`'s family.
-    fn run<P: Protocol>(self, parser: P) -> Self::Output;
-}
-
-/// Does something with the parser of `model`.
-pub fn with_parser<W: WithParser>(model: &Model, with: W) -> W::Output {
-    match model.family {
-        Family::RplidarScan => with.run(rplidar::Parser::for_model(model)),
-        Family::RplidarExpress => with.run(rplidar::capsule::Parser::express(model)),
-        Family::RplidarDense => with.run(rplidar::capsule::Parser::dense(model)),
-        Family::RplidarUltra => with.run(rplidar::ultra::UltraParser::for_model(model)),
-        Family::RplidarUltraDense => with.run(rplidar::ultra::UltraDenseParser::for_model(model)),
-        Family::RplidarHq => with.run(rplidar::hq::Parser::for_model(model)),
-        Family::Ydlidar(_) => with.run(ydlidar::Parser::for_model(model)),
-        Family::Lds01 => with.run(lds01::Parser::for_model(model)),
-        Family::Xv11 => with.run(xv11::Parser::for_model(model)),
-        Family::Xv11Early => with.run(xv11::early::Parser::for_model(model)),
-        Family::Delta(_) => with.run(delta::Parser::for_model(model)),
-        Family::Camsense => with.run(camsense::Parser::for_model(model)),
-        Family::CoinD4 => with.run(coin_d4::Parser::for_model(model)),
-        Family::Scip(_) => with.run(scip::Parser::for_model(model)),
-        Family::Sick => with.run(sick::Parser::for_model(model)),
-        _ => with.run(ld06::Parser::for_model(model)),
     }
 }
 

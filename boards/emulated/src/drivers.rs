@@ -4,8 +4,8 @@
 //! `u32` each of bytes, beams, instructions, a checksum of all beams, bytes of the parser, bytes of a packet, stack.
 
 use beamfix::lidar::{
-    Family, Model, Packet as _, Protocol, camsense, coin_d4, delta, ld06, lds01, rplidar, scip,
-    sick, xv11, ydlidar,
+    Model, Packet as _, Protocol,
+    choice::{WithParser, with_parser},
 };
 use semihosting::{
     fs::File,
@@ -22,37 +22,26 @@ pub fn run(machine: &mut impl Machine, stack: &Stack) -> io::Result<()> {
     let model = Model::ALL
         .get(usize::from(choice[0]))
         .unwrap_or(&Model::LD06);
-    let cost = match model.family {
-        Family::RplidarScan => drive(rplidar::Parser::for_model(model), input, machine),
-        Family::RplidarExpress => drive(rplidar::capsule::Parser::express(model), input, machine),
-        Family::RplidarDense => drive(rplidar::capsule::Parser::dense(model), input, machine),
-        Family::RplidarUltra => drive(
-            rplidar::ultra::UltraParser::for_model(model),
-            input,
-            machine,
-        ),
-        Family::RplidarUltraDense => drive(
-            rplidar::ultra::UltraDenseParser::for_model(model),
-            input,
-            machine,
-        ),
-        Family::RplidarHq => drive(rplidar::hq::Parser::for_model(model), input, machine),
-        Family::Ydlidar(_) => drive(ydlidar::Parser::for_model(model), input, machine),
-        Family::Lds01 => drive(lds01::Parser::for_model(model), input, machine),
-        Family::Xv11 => drive(xv11::Parser::for_model(model), input, machine),
-        Family::Xv11Early => drive(xv11::early::Parser::for_model(model), input, machine),
-        Family::Delta(_) => drive(delta::Parser::for_model(model), input, machine),
-        Family::Camsense => drive(camsense::Parser::for_model(model), input, machine),
-        Family::CoinD4 => drive(coin_d4::Parser::for_model(model), input, machine),
-        Family::Scip(_) => drive(scip::Parser::for_model(model), input, machine),
-        Family::Sick => drive(sick::Parser::for_model(model), input, machine),
-        _ => drive(ld06::Parser::for_model(model), input, machine),
-    }?;
+    let cost = with_parser(model, Driving { input, machine })?;
     let mut output = File::create(OUTPUT)?;
     for number in cost.into_iter().chain([stack.peak()]) {
         output.write_all(&number.to_le_bytes())?;
     }
     Ok(())
+}
+
+/// A driver over the rest of the file.
+struct Driving<'a, M> {
+    input: File,
+    machine: &'a mut M,
+}
+
+impl<M: Machine> WithParser for Driving<'_, M> {
+    type Output = io::Result<[u32; 6]>;
+
+    fn run<P: Protocol>(self, parser: P) -> Self::Output {
+        drive(parser, self.input, self.machine)
+    }
 }
 
 #[inline(never)]
