@@ -5,13 +5,13 @@ pub mod card;
 pub mod drivers;
 pub mod emulator;
 pub mod fields;
+pub mod firmware;
+pub mod real;
 pub mod recording;
+pub mod rp2040js;
 pub mod stream;
 
-use std::{
-    path::{Path, PathBuf},
-    process::{Command, Stdio},
-};
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use beamfix_app::{
@@ -20,6 +20,7 @@ use beamfix_app::{
 };
 
 use emulator::Count;
+use firmware::Firmware;
 use recording::Recording;
 
 /// An emulated board.
@@ -29,9 +30,7 @@ pub struct Board {
     pub name: &'static str,
     /// What it stands for.
     pub core: &'static str,
-    /// Its crate: `boards/` and this.
-    package: &'static str,
-    target: &'static str,
+    firmware: Firmware,
     emulator: &'static str,
     machine: &'static [&'static str],
     /// Where the memory for statics and stack starts.
@@ -61,8 +60,7 @@ pub const BOARDS: &[Board] = &[
     Board {
         name: "m4f",
         core: "Cortex-M4F",
-        package: "qemu-m4f",
-        target: "thumbv7em-none-eabihf",
+        firmware: Firmware::new("qemu-m4f", "thumbv7em-none-eabihf"),
         emulator: "qemu-system-arm",
         machine: &["-M", "mps2-an386"],
         ram_start: 0x2000_0000,
@@ -74,8 +72,7 @@ pub const BOARDS: &[Board] = &[
     Board {
         name: "m0",
         core: "Cortex-M0",
-        package: "qemu-m0",
-        target: "thumbv6m-none-eabi",
+        firmware: Firmware::new("qemu-m0", "thumbv6m-none-eabi"),
         emulator: "qemu-system-arm",
         machine: &["-M", "microbit"],
         ram_start: 0x2000_0000,
@@ -87,8 +84,7 @@ pub const BOARDS: &[Board] = &[
     Board {
         name: "rv32",
         core: "RV32IMC",
-        package: "qemu-rv32",
-        target: "riscv32imc-unknown-none-elf",
+        firmware: Firmware::new("qemu-rv32", "riscv32imc-unknown-none-elf"),
         emulator: "qemu-system-riscv32",
         machine: &["-M", "virt", "-bios", "none"],
         ram_start: 0x8040_0000,
@@ -98,6 +94,32 @@ pub const BOARDS: &[Board] = &[
         uarts: &[Line::LidarAndTelemetry],
     },
 ];
+
+/// The firmware of a real board, the STM32F446's, in the nearest machine that QEMU has: it runs, but is no measure.
+pub const STM32F4: Board = Board {
+    name: "stm32f4",
+    core: "Cortex-M4F",
+    firmware: Firmware::new("nucleo-f446", "thumbv7em-none-eabihf").with("qemu"),
+    emulator: "qemu-system-arm",
+    machine: &["-M", "netduinoplus2"],
+    ram_start: 0x2000_0000,
+    ram_bytes: 128 << 10,
+    icount_shift: 6,
+    beams: BEAMS,
+    uarts: &[Line::Lidar, Line::Telemetry],
+};
+
+/// The emulated Cortex-M4F that simulates its lidar itself.
+pub const DEMO: Board = Board {
+    firmware: Firmware::new("qemu-m4f", "thumbv7em-none-eabihf").with("demo"),
+    ..BOARDS[0]
+};
+
+/// The emulated Cortex-M4F that sends MAVLink.
+pub const MAVLINK: Board = Board {
+    firmware: Firmware::new("qemu-m4f", "thumbv7em-none-eabihf").with("mavlink"),
+    ..BOARDS[0]
+};
 
 impl Board {
     /// The board of this name.
@@ -113,33 +135,7 @@ impl Board {
 
     /// Builds one of the board's programs (`""`: the firmware itself); gives the ELF file.
     pub fn build(&self, program: &str) -> Result<PathBuf> {
-        let folder = root().join("boards").join(self.package);
-        let target_dir = root().join("target/boards");
-        let program = if program.is_empty() {
-            self.package
-        } else {
-            program
-        };
-        let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-            .args(["build", "--release", "--bin", program])
-            .arg("--target-dir")
-            .arg(&target_dir)
-            .current_dir(&folder)
-            // The board's own flags count, not those that this program was started with.
-            .env_remove("RUSTFLAGS")
-            .env_remove("CARGO_ENCODED_RUSTFLAGS")
-            .env_remove("CARGO_BUILD_TARGET")
-            .stdin(Stdio::null())
-            .output()
-            .with_context(|| format!("cargo could not be started in {}", folder.display()))?;
-        if !output.status.success() {
-            bail!(
-                "boards/{}: {program} does not build (`./test setup` adds the targets):\n{}",
-                self.package,
-                String::from_utf8_lossy(&output.stderr)
-            );
-        }
-        Ok(target_dir.join(self.target).join("release").join(program))
+        self.firmware.build(program)
     }
 
     /// Runs the application over a recording, in the emulator; the costs are worth something with [`Count::Exact`].

@@ -12,6 +12,7 @@ mod replay;
 mod simulate;
 mod track;
 mod verify;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -41,6 +42,7 @@ enum Command {
     Bench(bench::Args),
     Card(card::Args),
     Verify(verify::Args),
+    Watch(watch::Args),
 }
 
 /// Exit status of a run that could not do its work: a bad file, a bad setting.
@@ -58,6 +60,7 @@ pub fn run() -> ExitCode {
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Card(args)) => card::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
+        Some(Command::Watch(args)) => watch::run(&args),
         Some(Command::Simulate(args)) => simulate::run(&args),
         None => simulate::run(&tool.simulate),
     };

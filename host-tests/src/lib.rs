@@ -18,3 +18,4 @@ pub mod sim;
 pub mod size;
 pub mod telemetry_file;
 pub mod timed;
+pub mod watch;

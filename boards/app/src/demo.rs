@@ -1,4 +1,5 @@
-//! A lidar that is not there: a robot drives in a circle through a room, and the bytes of its LD06 come out.
+//! A lidar that is not there: a robot stands for a second, then drives in a circle through a room, and the bytes of its
+//! LD06 come out.
 //!
 //! In integers, so that a board without a floating point unit keeps up with it, and everywhere the same bytes.
 
@@ -49,6 +50,9 @@ const fn wall(at: i32, from: i32, to: i32) -> Wall {
 const RADIUS: i32 = 1250;
 /// Time for one round (µs): 0.39 m/s, 18°/s.
 const ROUND_US: u64 = 20_000_000;
+/// So long it stands at the start, so long it takes to its speed (µs).
+const STANDS_US: u64 = 1_000_000;
+const STARTS_US: u64 = 2_000_000;
 /// Time between two beams (µs), 450 a revolution.
 const BEAM_US: u64 = 222;
 /// Bearing between two beams (1/65 536 turn).
@@ -66,6 +70,8 @@ pub struct Demo {
     beam_us: u64,
     /// When the clock was at 0.
     start_us: Option<u32>,
+    /// Robot at the first pose, in the room.
+    origin: Option<Pose>,
     random: u32,
 }
 
@@ -78,6 +84,7 @@ impl Demo {
             beams: 0,
             beam_us: 0,
             start_us: None,
+            origin: None,
             random: 1,
         }
     }
@@ -123,12 +130,14 @@ impl Demo {
         packet
     }
 
-    /// Where the robot really is at this time of the lidar's clock (µs), from where it was at 0.
+    /// Where the robot really is at this time of the lidar's clock (µs), from where it was when this was first asked:
+    /// at the first pose, which is the origin.
     #[must_use]
-    pub fn truth(&self, time_us: u32) -> Pose {
+    pub fn truth(&mut self, time_us: u32) -> Pose {
         // Its upper half: the pose was some time before the next beam.
         let ago_us = (self.beam_us as u32).wrapping_sub(time_us);
-        place(0).between(place(self.beam_us.saturating_sub(ago_us.into())))
+        let now = place(self.beam_us.saturating_sub(ago_us.into()));
+        self.origin.get_or_insert(now).between(now)
     }
 
     /// Clockwise direction of the next beam (0.01°).
@@ -172,7 +181,16 @@ impl Demo {
 
 /// The robot at a time (µs), in the room.
 fn place(time_us: u64) -> Pose {
-    let angle = (time_us % ROUND_US) as f32 * (core::f32::consts::TAU / ROUND_US as f32);
+    // Like a stone that is let go, from standing to its speed; from then on as if it had always had it.
+    let falling_us = time_us.saturating_sub(STANDS_US);
+    let along_us = match falling_us < STARTS_US {
+        true => {
+            let seconds = falling_us as f32 * 1e-6;
+            seconds * seconds * (0.5e12 / STARTS_US as f32)
+        }
+        false => ((falling_us - STARTS_US / 2) % ROUND_US) as f32,
+    };
+    let angle = along_us * (core::f32::consts::TAU / ROUND_US as f32);
     let (sin, cos) = math::sin_cos(angle);
     let radius = RADIUS as f32 / 1000.0;
     let quarter = core::f32::consts::FRAC_PI_2;

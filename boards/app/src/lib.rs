@@ -46,8 +46,9 @@ const HEALTH_EVERY: u16 = 16;
 /// Longest time that bytes of the lidar wait for others before they are sent on (µs).
 const RAW_US: u32 = 20_000;
 
-/// Most beams of a revolution; further ones are refused and counted. An LD06 sends 450 at 10 Hz.
-pub const BEAMS: usize = 460;
+/// Most beams of a revolution; further ones are refused and counted. An LD06 sends 450 at 10 Hz. It is also the number
+/// of directions that a keyframe tells apart, so a PC finds the same bits only with the same: the tool's nearest is this.
+pub const BEAMS: usize = 456;
 /// The same on a board with 16 KB of RAM: the last 20 of a revolution, 16°, are given up so that the stack fits too.
 pub const SMALL_BEAMS: usize = 430;
 /// Change it here for all boards.
@@ -205,7 +206,7 @@ impl<const N: usize> App<N> {
 
     /// How far the last pose is from where the simulated robot really is; most often nothing, for nothing was found.
     #[cfg(feature = "demo")]
-    pub fn truth(&mut self, demo: &demo::Demo) -> &[u8] {
+    pub fn truth(&mut self, demo: &mut demo::Demo) -> &[u8] {
         self.turns.out.clear();
         if let Some(at) = self.turns.pose_us.take() {
             self.turns.tell_truth(demo.truth(at));
@@ -264,7 +265,14 @@ impl<const N: usize> App<N> {
                     self.turns.beam(beam, turn_starts && k == 0);
                 }
             }
-            Some(Command::Health) => self.turns.health_due = true,
+            Some(Command::Health) => {
+                // What is left of a recording comes too.
+                if !self.raw.bytes.is_empty() {
+                    self.turns.send_raw(&self.raw);
+                    self.raw.bytes.clear();
+                }
+                self.turns.health_due = true;
+            }
             Some(Command::Send { raw, scans }) => {
                 self.turns.record = raw;
                 self.turns.scans = scans;
@@ -422,7 +430,7 @@ impl<const N: usize> Turns<N> {
             }
             Output::Text => text::append(message, &mut self.out),
             #[cfg(feature = "mavlink")]
-            Output::Mavlink => {}
+            Output::Mavlink => mavlink::append_heartbeat(message, &mut self.out),
         }
     }
 }

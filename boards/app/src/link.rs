@@ -52,6 +52,8 @@ impl<const N: usize> Framing<'_, N> {
         Ok(self)
     }
 
+    /// Apart: it is called for every byte of every field of every message.
+    #[inline(never)]
     fn encode(&mut self, byte: u8) -> postcard::Result<()> {
         match self.state.push(byte) {
             PushResult::AddSingle(byte) => append_byte(self.out, byte),
@@ -67,6 +69,12 @@ impl<const N: usize> Framing<'_, N> {
         }
     }
 
+    #[inline(never)]
+    fn check_and_encode(&mut self, byte: u8) -> postcard::Result<()> {
+        self.digest.update(&[byte]);
+        self.encode(byte)
+    }
+
     fn set(&mut self, at: usize, distance: u8) -> postcard::Result<()> {
         let slot = self.out.get_mut(self.start + at);
         *slot.ok_or(postcard::Error::SerializeBufferFull)? = distance;
@@ -78,8 +86,7 @@ impl<const N: usize> Flavor for Framing<'_, N> {
     type Output = ();
 
     fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
-        self.digest.update(&[byte]);
-        self.encode(byte)
+        self.check_and_encode(byte)
     }
 
     fn finalize(mut self) -> postcard::Result<()> {

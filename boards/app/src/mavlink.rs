@@ -1,4 +1,4 @@
-//! Poses and obstacles as MAVLink 2, for an autopilot: `ODOMETRY` and `OBSTACLE_DISTANCE`.
+//! Poses and obstacles as MAVLink 2, for an autopilot: `ODOMETRY` and `OBSTACLE_DISTANCE`, a `HEARTBEAT` now and then.
 //!
 //! MAVLink's axes are forward, right, down; ours forward, left, up.
 
@@ -11,20 +11,37 @@ use heapless::Vec;
 use mavlink::{
     MAVLinkV2MessageRaw, MavHeader, MessageData,
     dialects::common::{
-        MavDistanceSensor, MavEstimatorType, MavFrame, OBSTACLE_DISTANCE_DATA, ODOMETRY_DATA,
+        HEARTBEAT_DATA, MavAutopilot, MavDistanceSensor, MavEstimatorType, MavFrame, MavModeFlag,
+        MavState, MavType, OBSTACLE_DISTANCE_DATA, ODOMETRY_DATA,
     },
 };
 
-use crate::telemetry::{Pose, Verdict};
+use crate::telemetry::{Pose, Telemetry, Verdict};
 
 /// Who sends: the autopilot's own system, component `MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY`.
-const SYSTEM: u32 = 1;
+const SYSTEM: u8 = 1;
 const COMPONENT: u8 = 197;
 /// Directions of `OBSTACLE_DISTANCE`, 5° each.
 pub const SECTORS: usize = 72;
 /// What an LD06 sees (cm).
 const NEAREST_CM: u16 = 2;
 const FARTHEST_CM: u16 = 1200;
+
+/// Appends a `HEARTBEAT` for the messages that come at the start and now and then.
+#[inline(never)]
+pub fn append_heartbeat<const B: usize>(message: &Telemetry, out: &mut Vec<u8, B>) {
+    if let Telemetry::Ready(_) | Telemetry::Health(_) = message {
+        let heartbeat = HEARTBEAT_DATA {
+            custom_mode: 0,
+            mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+            base_mode: MavModeFlag::empty(),
+            system_status: MavState::MAV_STATE_ACTIVE,
+            mavlink_version: 3,
+        };
+        send(0, &heartbeat, out);
+    }
+}
 
 /// Appends both messages, each only where there is room for all of it.
 #[inline(never)]

@@ -80,7 +80,7 @@ pub fn run<const N: usize, const L: usize, const C: usize>(
             hardware.send(sent);
             hardware.log(app.pose());
             #[cfg(feature = "demo")]
-            hardware.send(app.truth(&demo));
+            hardware.send(app.truth(&mut demo));
         }
     }
 }

@@ -71,6 +71,7 @@ pub fn append_error<const N: usize>(mm: f32, degrees: f32, out: &mut Vec<u8, N>)
 struct Line<'a, const N: usize>(&'a mut Vec<u8, N>);
 
 impl<const N: usize> Line<'_, N> {
+    #[inline(never)]
     fn word(self, word: &str) -> Self {
         for &byte in word.as_bytes() {
             let _ = self.0.push(byte);
@@ -78,6 +79,7 @@ impl<const N: usize> Line<'_, N> {
         self
     }
 
+    #[inline(never)]
     fn integer(self, value: u32) -> Self {
         let (mut digits, mut rest) = (Vec::<u8, 10>::new(), value);
         loop {
@@ -93,6 +95,7 @@ impl<const N: usize> Line<'_, N> {
         self
     }
 
+    #[inline(never)]
     /// With so many decimals, at most 3; what does not fit into 31 bits then is held at the largest.
     fn decimal(self, value: f32, decimals: u8) -> Self {
         let scale = [1, 10, 100, 1000]
@@ -113,6 +116,7 @@ impl<const N: usize> Line<'_, N> {
         line
     }
 
+    #[inline(never)]
     fn pose(self, x: f32, y: f32, theta: f32) -> Self {
         self.word("x ")
             .decimal(x, 3)

@@ -5,6 +5,8 @@
 #![no_std]
 
 pub mod bench;
+#[cfg(feature = "demo")]
+pub mod demo;
 pub mod drivers;
 pub mod fields;
 mod panic;

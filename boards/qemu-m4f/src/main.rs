@@ -5,9 +5,10 @@
 use beamfix_app::{
     AppConfig, Board, CONFIG,
     ring::Ring,
-    run::{Hardware, NoPwm, run},
+    run::{Hardware, NoPwm, TICK_US, run},
 };
 use beamfix_emulated::Machine as _;
+use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::{entry, exception};
 use qemu_m4f::{clock::Timer, uart::Uart};
 
@@ -42,7 +43,7 @@ impl Hardware for Mps2 {
 }
 
 /// As this crate's features want it.
-const HERE: AppConfig = CONFIG.for_features(false, cfg!(feature = "mavlink"));
+const HERE: AppConfig = CONFIG.for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"));
 
 #[entry]
 fn main() -> ! {
@@ -52,10 +53,25 @@ fn main() -> ! {
     Uart::LIDAR.enable();
     Uart::COMMANDS.enable();
     Timer.restart();
+    wake_now_and_then();
     run(APP, &HERE, (&LIDAR, &COMMANDS), &mut Mps2::default(), NoPwm)
 }
 
-/// Every interrupt; only the UARTs' are enabled.
+/// For the loop's look; the interrupt itself does nothing.
+fn wake_now_and_then() {
+    /// The core's clock (Hz).
+    const CLOCK: u32 = 25_000_000;
+    let Some(mut core) = cortex_m::Peripherals::take() else {
+        return;
+    };
+    core.SYST.set_reload(CLOCK / (1_000_000 / TICK_US) - 1);
+    core.SYST.set_clock_source(SystClkSource::Core);
+    core.SYST.clear_current();
+    core.SYST.enable_interrupt();
+    core.SYST.enable_counter();
+}
+
+/// Every interrupt; of the machine's, only the UARTs' are enabled.
 #[exception]
 unsafe fn DefaultHandler(interrupt: i16) {
     for (uart, ring) in [(Uart::LIDAR, &LIDAR), (Uart::COMMANDS, &COMMANDS)] {

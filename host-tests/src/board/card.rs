@@ -4,10 +4,10 @@ use std::{fs, path::Path};
 
 use anyhow::{Context as _, Result, ensure};
 use beamfix_app::telemetry::Cost;
-use object::{Object as _, ObjectSection as _, SectionKind};
+use object::{Object as _, ObjectSection as _, SectionFlags, SectionKind};
 use serde::{Deserialize, Serialize};
 
-use super::{Board, emulator::Count, recording::Recording, root};
+use super::{Board, emulator::Count, real::RealCard, recording::Recording, root};
 use crate::{
     encoder::ld06::Sensor,
     sim::drive::{Settings, drive},
@@ -64,7 +64,10 @@ pub fn recording() -> Recording {
 
 /// Measures a board.
 pub fn measure(board: &Board, recording: &Recording) -> Result<Card> {
-    let (flash_bytes, ram_bytes) = sizes(&board.build("")?, board.ram_start)?;
+    let (flash_bytes, ram_bytes) = sizes(
+        &board.build("")?,
+        &[(board.ram_start, board.ram_start + board.ram_bytes)],
+    )?;
     let replay = board.replay(recording, Count::Exact)?;
     let stack_bytes = replay.costs.iter().map(|cost| cost.stack_bytes).max();
     let mut instructions: Vec<u32> = replay
@@ -96,57 +99,65 @@ pub fn measure(board: &Board, recording: &Recording) -> Result<Card> {
     })
 }
 
-/// Makes these the golden figures: `host-tests/golden/card.json` and the rows of the README's table.
-pub fn bless(cards: &[Card]) -> Result<()> {
-    let golden = root().join("host-tests/golden/card.json");
-    fs::write(&golden, serde_json::to_string_pretty(cards)? + "\n")
-        .with_context(|| golden.display().to_string())?;
-    let readme = root().join("README.md");
-    let text = fs::read_to_string(&readme).with_context(|| readme.display().to_string())?;
-    let is_row = |line: &&str| {
+/// Makes these the golden figures: `host-tests/golden/card.json`, `boards.json`, and the rows of the README's tables.
+pub fn bless(cards: &[Card], boards: &[RealCard]) -> Result<()> {
+    let golden = root().join("host-tests/golden");
+    fs::write(golden.join("card.json"), pretty(cards)?)?;
+    fs::write(golden.join("boards.json"), pretty(boards)?)?;
+    let mut rows: Vec<(String, String)> = Vec::new();
+    rows.extend(
         cards
             .iter()
-            .any(|card| line.starts_with(&format!("| {} | ", card.board)))
-    };
-    let rows = text.lines().filter(is_row).count();
-    ensure!(
-        rows == cards.len(),
-        "README.md has {rows} rows of the cost table, not {}",
-        cards.len()
+            .map(|card| (card.board.clone(), card.markdown())),
     );
-    let mut new = cards.iter().map(Card::markdown);
-    let lines = text.lines().map(|line| {
-        let row = if is_row(&line) { new.next() } else { None };
-        row.unwrap_or_else(|| line.into())
-    });
-    let text: Vec<String> = lines.collect();
-    fs::write(&readme, text.join("\n") + "\n").with_context(|| readme.display().to_string())
+    rows.extend(
+        boards
+            .iter()
+            .map(|card| (card.board.clone(), card.markdown())),
+    );
+    let readme = root().join("README.md");
+    let mut text = fs::read_to_string(&readme).with_context(|| readme.display().to_string())?;
+    for (board, row) in rows {
+        let start = format!("| {board} | ");
+        let old = text.lines().find(|line| line.starts_with(&start));
+        let old = old.with_context(|| format!("README.md has no row of {board}"))?;
+        text = text.replace(&old.to_owned(), &row);
+    }
+    fs::write(&readme, text).with_context(|| readme.display().to_string())
 }
 
-/// Bytes in flash and of statics in RAM.
-fn sizes(elf: &Path, ram_start: u64) -> Result<(u64, u64)> {
+fn pretty(value: &(impl Serialize + ?Sized)) -> Result<String> {
+    Ok(serde_json::to_string_pretty(value)? + "\n")
+}
+
+/// Bytes in flash and of statics in RAM, which lies between these addresses.
+pub(super) fn sizes(elf: &Path, ram: &[(u64, u64)]) -> Result<(u64, u64)> {
     let bytes = fs::read(elf).with_context(|| elf.display().to_string())?;
     let file = object::File::parse(&*bytes).with_context(|| elf.display().to_string())?;
-    let (mut flash, mut ram) = (0, 0);
+    let (mut flash, mut statics) = (0, 0);
     for section in file.sections() {
         let name = section.name().unwrap_or_default();
+        let SectionFlags::Elf { sh_flags, .. } = section.flags() else {
+            continue;
+        };
+        // What the runtimes leave to the heap and the stack is a section too.
+        if sh_flags.0 & object::elf::SHF_ALLOC.0 == 0 || matches!(name, ".heap" | ".stack") {
+            continue;
+        }
         let kept = !matches!(
             section.kind(),
             SectionKind::UninitializedData | SectionKind::UninitializedTls
         );
-        let loaded = section.address() != 0 || name == ".vector_table";
-        // What the runtimes leave to the heap and the stack is a section too.
-        if !loaded || matches!(name, ".heap" | ".stack") || name.starts_with(".debug") {
-            continue;
-        }
+        let is_filler = name.ends_with("_dummy") || name.ends_with("_gap");
         if kept {
             flash += section.size();
         }
-        if section.address() >= ram_start {
-            ram += section.size();
+        let in_ram = |&(start, end): &(u64, u64)| (start..end).contains(&section.address());
+        if !is_filler && ram.iter().any(in_ram) {
+            statics += section.size();
         }
     }
-    Ok((flash, ram))
+    Ok((flash, statics))
 }
 
 fn rustc_version() -> Result<String> {

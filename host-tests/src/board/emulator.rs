@@ -51,6 +51,16 @@ pub fn run(board: &Board, elf: &Path, input: &[u8], count: Count) -> Result<Vec<
     Ok(fs::read(folder.0.join("output.bin"))?)
 }
 
+/// The emulator with the program `demo`, which prints to standard output and ends by itself.
+pub fn demo(board: &Board) -> Result<Command> {
+    let elf = board.firmware.with("demo").build("demo")?;
+    let mut command = start(board, &elf);
+    command
+        .args(["-serial", "none"])
+        .args(["-semihosting-config", "enable=on,target=native"]);
+    Ok(command)
+}
+
 /// The emulator with a program, without any connection to it.
 pub(super) fn start(board: &Board, elf: &Path) -> Command {
     let mut command = Command::new(board.emulator);

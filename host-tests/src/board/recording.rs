@@ -73,6 +73,11 @@ impl Recording {
         recording
     }
 
+    /// Any command.
+    pub fn send(&mut self, command: &Command) {
+        self.push(command);
+    }
+
     fn push(&mut self, command: &Command) {
         let mut frame = heapless::Vec::<u8, { link::FRAME }>::new();
         assert!(

@@ -18,7 +18,7 @@ use beamfix_app::{
 
 use super::{
     Board, Line,
-    emulator::{Folder, Running, start},
+    emulator::{self, Folder, Running},
 };
 
 /// Longest silence of a board that owes an answer.
@@ -29,6 +29,7 @@ pub struct Stream {
     lidar: UnixStream,
     /// The same socket as `lidar` on a board with one UART.
     telemetry: UnixStream,
+    commands: Option<UnixStream>,
     receiver: Receiver,
     running: Running,
     _folder: Folder,
@@ -37,15 +38,20 @@ pub struct Stream {
 impl Stream {
     /// Builds and starts the firmware; returns when it listens.
     pub fn open(board: &Board) -> Result<Self> {
+        let mut stream = Self::start(board)?;
+        match stream.receive()? {
+            Telemetry::Ready(_) => Ok(stream),
+            other => bail!("{}: first came {other:?}, not that it listens", board.name),
+        }
+    }
+
+    /// Builds and starts the firmware; it listens once it has sent something.
+    pub fn start(board: &Board) -> Result<Self> {
         let elf = board.build("")?;
         let folder = Folder::new()?;
-        let mut command = start(board, &elf);
+        let mut command = emulator::start(board, &elf);
         let mut listeners = Vec::new();
         for (k, line) in board.uarts.iter().enumerate() {
-            if *line == Line::Commands {
-                command.args(["-serial", "null"]);
-                continue;
-            }
             let path = folder.0.join(format!("uart{k}"));
             listeners.push((*line, UnixListener::bind(&path)?));
             command.arg("-chardev");
@@ -53,7 +59,7 @@ impl Stream {
             command.args(["-serial", &format!("chardev:u{k}")]);
         }
         let mut running = Running::spawn(&mut command, board)?;
-        let (mut lidar, mut telemetry) = (None, None);
+        let (mut lidar, mut telemetry, mut commands) = (None, None, None);
         for (line, listener) in listeners {
             let socket = accept(&listener)
                 .with_context(|| format!("{}: {}", board.name, running.complaint()))?;
@@ -64,7 +70,7 @@ impl Stream {
                     lidar = Some(socket.try_clone()?);
                     telemetry = Some(socket);
                 }
-                Line::Commands => {}
+                Line::Commands => commands = Some(socket),
             }
         }
         let (Some(lidar), Some(telemetry)) = (lidar, telemetry) else {
@@ -72,17 +78,14 @@ impl Stream {
         };
         telemetry.set_read_timeout(Some(TIMEOUT))?;
         lidar.set_write_timeout(Some(TIMEOUT))?;
-        let mut stream = Self {
+        Ok(Self {
             lidar,
             telemetry,
+            commands,
             receiver: Receiver::new(),
             running,
             _folder: folder,
-        };
-        match stream.receive()? {
-            Telemetry::Ready(_) => Ok(stream),
-            other => bail!("{}: first came {other:?}, not that it listens", board.name),
-        }
+        })
     }
 
     /// Sends bytes of the lidar.
@@ -90,6 +93,27 @@ impl Stream {
         self.lidar
             .write_all(bytes)
             .context("the board takes no more bytes")
+    }
+
+    /// The lidar's line, for a thread of its own.
+    pub fn lidar(&self) -> Result<UnixStream> {
+        Ok(self.lidar.try_clone()?)
+    }
+
+    /// The line for commands, where the board has one.
+    pub fn commands(&mut self) -> Option<&mut UnixStream> {
+        self.commands.as_mut()
+    }
+
+    /// Reads what comes within this time, as it is: 0 bytes where nothing does.
+    pub fn read_for(&mut self, bytes: &mut [u8], time: Duration) -> Result<usize> {
+        self.telemetry.set_read_timeout(Some(time))?;
+        match self.telemetry.read(bytes) {
+            Ok(0) => bail!("the emulator ended: {}", self.running.complaint()),
+            Ok(n) => Ok(n),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(0),
+            Err(error) => Err(error.into()),
+        }
     }
 
     /// Waits for the next message.

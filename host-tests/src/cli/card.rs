@@ -8,17 +8,19 @@ use host_tests::board::{
     BOARDS, Board,
     card::{self, Card},
     drivers,
+    real::{REAL, Real, RealCard},
 };
 
 use super::output;
 
-/// Flash, memory, stack and instructions of the firmware on the emulated boards, and of each lidar's driver on the
-/// Cortex-M0.
+/// Flash, memory, stack and instructions of the firmware on the emulated boards, what that means for the real ones, and
+/// what each lidar's driver takes on the Cortex-M0.
 ///
+/// Instructions of a real board are those of its core as emulated, cycles a model; its flash and statics are its own.
 /// The tests compare them with `host-tests/golden/card.json`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Only this one: m4f, m0 or rv32.
+    /// Only this one: m4f, m0, rv32, or a real board.
     #[arg(long, value_name = "NAME")]
     board: Option<String>,
     /// Write the figures to `host-tests/golden/card.json` and into the README's table.
@@ -32,17 +34,29 @@ pub struct Args {
 /// Builds, runs, reports.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let recording = card::recording();
-    let boards: Vec<&Board> = match &args.board {
-        Some(name) => vec![Board::named(name)?],
-        None => BOARDS.iter().collect(),
+    let only = args.board.as_deref();
+    let real: Vec<&Real> = match only {
+        Some(name) => Real::named(name).into_iter().collect(),
+        None => REAL.iter().collect(),
+    };
+    let boards: Vec<&Board> = match (only, &real[..]) {
+        (Some(_), [real]) => vec![Board::named(real.emulated)?],
+        (Some(name), _) => vec![Board::named(name)?],
+        (None, _) => BOARDS.iter().collect(),
     };
     // Drivers are measured on the smallest core.
-    let with_drivers = boards.iter().any(|board| board.name == "m0");
+    let with_drivers = only.is_none_or(|name| name == "m0");
     let models = if with_drivers { Model::ALL.len() } else { 0 };
-    let bar = output::progress(boards.len() + models, "boards");
+    let bar = output::progress(boards.len() + real.len() + models, "boards");
     let mut cards = Vec::new();
     for board in boards {
         cards.push(card::measure(board, &recording)?);
+        bar.inc(1);
+    }
+    let mut real_cards = Vec::new();
+    for real in real {
+        let core = cards.iter().find(|card| card.board == real.emulated);
+        real_cards.extend(core.map(|core| real.measure(core)).transpose()?);
         bar.inc(1);
     }
     let drivers = match with_drivers {
@@ -51,7 +65,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     bar.finish_and_clear();
     if args.bless {
-        card::bless(&cards)?;
+        card::bless(&cards, &real_cards)?;
     }
     let mut value = serde_json::to_value(&cards)?;
     for row in value.as_array_mut().into_iter().flatten() {
@@ -59,21 +73,55 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             row["drivers"] = serde_json::to_value(&drivers)?;
         }
     }
+    if let (Some(rows), Some(more)) = (
+        value.as_array_mut(),
+        serde_json::to_value(&real_cards)?.as_array_mut(),
+    ) {
+        rows.append(more);
+    }
     let json = serde_json::to_string_pretty(&value)?;
     let text = if args.json {
         json
     } else {
-        text(&cards, &drivers)
+        text(&cards, &real_cards, &drivers)
     };
     output::report(false, &value, &text)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn text(cards: &[Card], drivers: &[drivers::Cost]) -> String {
-    match drivers {
-        [] => table(cards),
-        _ => table(cards) + "\n\n" + &drivers::table(drivers),
+fn text(cards: &[Card], real: &[RealCard], drivers: &[drivers::Cost]) -> String {
+    let mut text = table(cards);
+    if !real.is_empty() {
+        text += "\n\n";
+        text += &real_table(real);
     }
+    if !drivers.is_empty() {
+        text += "\n\n";
+        text += &drivers::table(drivers);
+    }
+    text
+}
+
+fn real_table(cards: &[RealCard]) -> String {
+    let mut text = String::from(
+        "board         clock MHz     flash KB        RAM KB  stack B  core at 10 Hz  longest match  good enough",
+    );
+    for card in cards {
+        text += &format!(
+            "\n{:<13} {:>9} {:>4} of {:>5} {:>5.1} of {:>4} {:>8} {:>12.1} % {:>11.1} ms  {}",
+            card.board,
+            card.clock_mhz,
+            card.flash_bytes >> 10,
+            card.flash_of >> 10,
+            card.ram_bytes as f64 / 1024.0,
+            card.ram_of >> 10,
+            card.stack_bytes,
+            card.share_percent,
+            card.longest_ms,
+            card.verdict.word(),
+        );
+    }
+    text
 }
 
 fn table(cards: &[Card]) -> String {

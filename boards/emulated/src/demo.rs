@@ -1,0 +1,29 @@
+//! The board alone: the lidar is simulated on it, poses and their errors are lines on standard output.
+
+use beamfix_app::{App, AppConfig, CONFIG, Output, demo::Demo, telemetry::Reset};
+use semihosting::io::{self, Write as _};
+
+/// Lines for a terminal.
+pub const TEXT: AppConfig = AppConfig {
+    output: Output::Text,
+    ..CONFIG
+};
+/// Two rounds of the circle.
+const TURNS: u32 = 400;
+
+/// Drives for [`TURNS`] revolutions of the lidar.
+pub fn run<const N: usize>(app: &mut App<N>) -> io::Result<()> {
+    let mut output = io::stdout()?;
+    output.write_all(app.ready(Reset::Other))?;
+    let mut demo = Demo::new();
+    while app.seen().turns < TURNS {
+        for byte in demo.packet() {
+            let sent = app.lidar(byte);
+            if !sent.is_empty() {
+                output.write_all(sent)?;
+                output.write_all(app.truth(&mut demo))?;
+            }
+        }
+    }
+    Ok(())
+}

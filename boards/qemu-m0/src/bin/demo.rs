@@ -1,0 +1,14 @@
+//! The board alone, without a lidar; see `beamfix_emulated::demo`.
+#![no_std]
+#![no_main]
+
+use beamfix_app::SmallBoard;
+use beamfix_emulated::{demo, finish};
+// The machine's memory and start.
+use qemu_m0 as _;
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    static mut APP: SmallBoard = SmallBoard::new(demo::TEXT);
+    finish(demo::run(APP))
+}

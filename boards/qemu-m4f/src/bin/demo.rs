@@ -1,0 +1,14 @@
+//! The board alone, without a lidar; see `beamfix_emulated::demo`.
+#![no_std]
+#![no_main]
+
+use beamfix_app::Board;
+use beamfix_emulated::{demo, finish};
+// The machine's memory and start.
+use qemu_m4f as _;
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    static mut APP: Board = Board::new(demo::TEXT);
+    finish(demo::run(APP))
+}

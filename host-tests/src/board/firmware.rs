@@ -1,0 +1,85 @@
+//! Building the crates in `boards/`.
+
+use std::{
+    fs,
+    path::PathBuf,
+    process::{Command, Stdio},
+    sync::Mutex,
+};
+
+use anyhow::{Context as _, Result, bail};
+
+use super::root;
+
+/// A crate in `boards/`.
+#[derive(Debug, Clone, Copy)]
+pub struct Firmware {
+    /// Its folder and name.
+    pub package: &'static str,
+    target: &'static str,
+    feature: &'static str,
+}
+
+impl Firmware {
+    /// The crate as it is.
+    #[must_use]
+    pub const fn new(package: &'static str, target: &'static str) -> Self {
+        Self {
+            package,
+            target,
+            feature: "",
+        }
+    }
+
+    /// The same with a feature.
+    #[must_use]
+    pub const fn with(self, feature: &'static str) -> Self {
+        Self { feature, ..self }
+    }
+
+    /// Builds one of its programs (`""`: the one of its name); gives a copy of the ELF file that nobody overwrites with
+    /// another feature's.
+    pub fn build(&self, program: &str) -> Result<PathBuf> {
+        static ONE_BY_ONE: Mutex<()> = Mutex::new(());
+        let _alone = ONE_BY_ONE.lock();
+        let folder = root().join("boards").join(self.package);
+        let target_dir = root().join("target/boards");
+        let program = match program {
+            "" => self.package,
+            other => other,
+        };
+        let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+            .args(["build", "--release", "--bin", program])
+            .args(["--features", self.feature])
+            .arg("--target-dir")
+            .arg(&target_dir)
+            .current_dir(&folder)
+            // The board's own flags count, not those that this program was started with.
+            .env_remove("RUSTFLAGS")
+            .env_remove("CARGO_ENCODED_RUSTFLAGS")
+            .env_remove("CARGO_BUILD_TARGET")
+            .stdin(Stdio::null())
+            .output()
+            .with_context(|| format!("cargo could not be started in {}", folder.display()))?;
+        if !output.status.success() {
+            bail!(
+                "boards/{}: {program} does not build (`./test setup` adds the targets):\n{}",
+                self.package,
+                String::from_utf8_lossy(&output.stderr)
+            );
+        }
+        let built = target_dir.join(self.target).join("release").join(program);
+        let folder = target_dir
+            .join("elf")
+            .join(self.package)
+            .join(if self.feature.is_empty() {
+                "plain"
+            } else {
+                self.feature
+            });
+        fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+        let kept = folder.join(program);
+        fs::copy(&built, &kept).with_context(|| built.display().to_string())?;
+        Ok(kept)
+    }
+}

@@ -1,0 +1,229 @@
+//! The real boards: what their firmware takes of the chip.
+//!
+//! Flash and statics are the firmware's own. Nobody has one of these boards here: stack and instructions are those of
+//! the emulated board with the same instruction set, and cycles are a model.
+
+use anyhow::Result;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    card::{Card, sizes},
+    firmware::Firmware,
+};
+
+/// A board that people have.
+#[derive(Debug)]
+pub struct Real {
+    /// What it is called.
+    pub name: &'static str,
+    /// Its firmware.
+    pub firmware: Firmware,
+    /// The emulated board that executes the same instructions.
+    pub emulated: &'static str,
+    /// As the firmware sets it.
+    clock_mhz: u32,
+    /// Cycles an instruction: zero wait states, Arm's published tables; RISC-V as the M4.
+    cycles: f64,
+    flash_bytes: u64,
+    /// All the RAM there is.
+    ram_bytes: u64,
+    /// Where the chip shows it: begin and end.
+    ram: &'static [(u64, u64)],
+}
+
+const CORTEX_M0: f64 = 1.5;
+const CORTEX_M4: f64 = 1.25;
+const RAM_2000: &[(u64, u64)] = &[(0x2000_0000, 0x2010_0000)];
+
+/// All there are.
+pub const REAL: &[Real] = &[
+    Real {
+        name: "nucleo-f446",
+        firmware: Firmware::new("nucleo-f446", "thumbv7em-none-eabihf"),
+        emulated: "m4f",
+        clock_mhz: 168,
+        cycles: CORTEX_M4,
+        flash_bytes: 512 << 10,
+        ram_bytes: 128 << 10,
+        ram: RAM_2000,
+    },
+    Real {
+        name: "pico",
+        firmware: Firmware::new("pico", "thumbv6m-none-eabi"),
+        emulated: "m0",
+        clock_mhz: 125,
+        cycles: CORTEX_M0,
+        flash_bytes: 2 << 20,
+        ram_bytes: 264 << 10,
+        ram: RAM_2000,
+    },
+    Real {
+        name: "pico-embassy",
+        firmware: Firmware::new("pico-embassy", "thumbv6m-none-eabi"),
+        emulated: "m0",
+        clock_mhz: 125,
+        cycles: CORTEX_M0,
+        flash_bytes: 2 << 20,
+        ram_bytes: 264 << 10,
+        ram: RAM_2000,
+    },
+    Real {
+        name: "pico2",
+        firmware: Firmware::new("pico2", "thumbv8m.main-none-eabihf"),
+        emulated: "m4f",
+        clock_mhz: 150,
+        cycles: CORTEX_M4,
+        flash_bytes: 4 << 20,
+        ram_bytes: 520 << 10,
+        ram: RAM_2000,
+    },
+    Real {
+        name: "nrf52840-dk",
+        firmware: Firmware::new("nrf52840-dk", "thumbv7em-none-eabihf"),
+        emulated: "m4f",
+        clock_mhz: 64,
+        cycles: CORTEX_M4,
+        flash_bytes: 1 << 20,
+        ram_bytes: 256 << 10,
+        ram: RAM_2000,
+    },
+    Real {
+        name: "esp32-c3",
+        firmware: Firmware::new("esp32-c3", "riscv32imc-unknown-none-elf"),
+        emulated: "rv32",
+        clock_mhz: 160,
+        cycles: CORTEX_M4,
+        flash_bytes: 4 << 20,
+        ram_bytes: 400 << 10,
+        ram: &[(0x3fc8_0000, 0x3fd0_0000), (0x4037_0000, 0x4040_0000)],
+    },
+];
+
+/// Revolutions a second of an LD06.
+const RATE: f64 = 10.0;
+/// Bytes a second that it sends.
+const BYTES: f64 = 17_625.0;
+/// Instructions that a byte takes besides the median match: interrupt, ring, parser, telemetry, and its share of the longer
+/// matches. So many are left of the cycles that the Pico is awake in rp2040js (25 % in `host-tests/tests/boards_uart.rs`).
+const BYTE: f64 = 600.0;
+/// How long the boards' rings hold what an LD06 sends (ms).
+const RING_MS: f64 = 178.0;
+
+/// One row of the table.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RealCard {
+    /// What it is called.
+    pub board: String,
+    /// What runs.
+    pub configuration: String,
+    /// Bytes in flash, and how many there are.
+    pub flash_bytes: u64,
+    /// The same.
+    pub flash_of: u64,
+    /// Statics, and how much RAM there is (bytes).
+    pub ram_bytes: u64,
+    /// The same.
+    pub ram_of: u64,
+    /// Deepest stack, as emulated (bytes); interrupts come on top.
+    pub stack_bytes: u64,
+    /// From the byte that completes a revolution to its pose, as emulated: median, most.
+    pub instructions: u64,
+    /// The same.
+    pub instructions_max: u64,
+    /// Where that was.
+    pub emulated: String,
+    /// The core's clock.
+    pub clock_mhz: u32,
+    /// Share of the core's time at 10 revolutions a second (%).
+    pub share_percent: f64,
+    /// The longest match (ms).
+    pub longest_ms: f64,
+    /// Whether that is good enough.
+    pub verdict: Verdict,
+}
+
+/// Whether a board is good enough.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// Half the core is left, and bytes never wait for more than a revolution.
+    Yes,
+    /// It goes, with nothing else beside it.
+    Marginal,
+    /// The core, the memory or the ring does not suffice.
+    No,
+}
+
+impl Real {
+    /// The board of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Self> {
+        REAL.iter().find(|board| board.name == name)
+    }
+
+    /// Builds the firmware and measures it, with what its core costs as emulated.
+    pub fn measure(&self, core: &Card) -> Result<RealCard> {
+        let (flash_bytes, ram_bytes) = sizes(&self.firmware.build("")?, self.ram)?;
+        let ms = |instructions: f64| instructions * self.cycles / f64::from(1000 * self.clock_mhz);
+        let busy_ms = RATE * ms(core.instructions as f64) + ms(BYTES * BYTE);
+        let share_percent = busy_ms / 10.0;
+        let longest_ms = ms(core.instructions_max as f64);
+        let fits = ram_bytes + core.stack_bytes < self.ram_bytes && flash_bytes < self.flash_bytes;
+        let verdict = if !fits || share_percent > 90.0 || longest_ms > RING_MS {
+            Verdict::No
+        } else if share_percent > 50.0 || longest_ms > 1000.0 / RATE {
+            Verdict::Marginal
+        } else {
+            Verdict::Yes
+        };
+        Ok(RealCard {
+            board: self.name.into(),
+            configuration: core.configuration.clone(),
+            flash_bytes,
+            flash_of: self.flash_bytes,
+            ram_bytes,
+            ram_of: self.ram_bytes,
+            stack_bytes: core.stack_bytes,
+            instructions: core.instructions,
+            instructions_max: core.instructions_max,
+            emulated: self.emulated.into(),
+            clock_mhz: self.clock_mhz,
+            share_percent: (10.0 * share_percent).round() / 10.0,
+            longest_ms: (10.0 * longest_ms).round() / 10.0,
+            verdict,
+        })
+    }
+}
+
+impl Verdict {
+    /// As a word.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Yes => "yes",
+            Self::Marginal => "marginal",
+            Self::No => "no",
+        }
+    }
+}
+
+impl RealCard {
+    /// A row of the README's table.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        format!(
+            "| {} | {} MHz | {} of {} | {:.1} of {} | {} | {} | {:.1} % | {:.1} ms | {} |",
+            self.board,
+            self.clock_mhz,
+            self.flash_bytes >> 10,
+            self.flash_of >> 10,
+            self.ram_bytes as f64 / 1024.0,
+            self.ram_of >> 10,
+            self.stack_bytes,
+            self.instructions,
+            self.share_percent,
+            self.longest_ms,
+            self.verdict.word()
+        )
+    }
+}

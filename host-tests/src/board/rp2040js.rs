@@ -1,0 +1,105 @@
+//! The Raspberry Pi Pico's firmware in rp2040js: cycles, and bytes at their exact times.
+
+use std::{
+    fs,
+    path::PathBuf,
+    process::{Command, Stdio},
+};
+
+use anyhow::{Context as _, Result, ensure};
+use serde::{Deserialize, Serialize};
+
+use super::{Replay, emulator::Folder, firmware::Firmware, root};
+
+/// The firmware that runs.
+pub const PICO: Firmware = Firmware::new("pico", "thumbv6m-none-eabi");
+
+/// What the lidar does.
+#[derive(Debug, Clone, Serialize)]
+pub struct Job {
+    #[serde(skip)]
+    bytes: Vec<u8>,
+    lidar: PathBuf,
+    telemetry: PathBuf,
+    /// Of the lidar's line.
+    pub baud: u32,
+    /// From which byte on a piece begins how long after the start (µs): the lidar's packets come one by one.
+    pub pieces: Vec<(usize, u64)>,
+    /// From which byte on how many bytes arrive in the very same moment.
+    pub bursts: Vec<(usize, usize)>,
+}
+
+/// What became of it.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Report {
+    /// Bytes sent.
+    pub sent: usize,
+    /// Bytes that found the UART full.
+    pub overruns: u32,
+    /// Simulated time from the first byte to the last.
+    pub seconds: f64,
+    /// Cycles of the core in that time that it was awake.
+    pub cycles: u64,
+    /// The others.
+    pub sleeping: u64,
+    /// What the firmware has sent.
+    #[serde(skip)]
+    pub replay: Replay,
+}
+
+impl Job {
+    /// A lidar that sends these bytes, a packet each 12/4500 s, at its own speed.
+    #[must_use]
+    pub fn ld06(bytes: &[u8]) -> Self {
+        let packets = bytes.len() / 47;
+        Self {
+            bytes: bytes.to_vec(),
+            lidar: PathBuf::new(),
+            telemetry: PathBuf::new(),
+            baud: beamfix_app::LIDAR_BAUD,
+            pieces: (0..packets)
+                .map(|packet| (47 * packet, packet as u64 * 12_000_000 / 4500))
+                .collect(),
+            bursts: Vec::new(),
+        }
+    }
+
+    /// Runs it; `None`, after a line that says why, where node or rp2040js is missing.
+    pub fn run(mut self) -> Result<Option<Report>> {
+        let here = root().join("host-tests/rp2040js");
+        if !here.join("node_modules/rp2040js").exists() {
+            println!("left out: rp2040js is not there; `./test setup` installs it");
+            return Ok(None);
+        }
+        let elf = PICO.build("")?;
+        let folder = Folder::new()?;
+        self.lidar = folder.0.join("lidar.bin");
+        self.telemetry = folder.0.join("telemetry.bin");
+        fs::write(&self.lidar, &self.bytes)?;
+        let job = folder.0.join("job.json");
+        fs::write(&job, serde_json::to_string(&self)?)?;
+        let output = Command::new("node")
+            .arg(here.join("run.js"))
+            .arg(elf)
+            .arg(job)
+            .stdin(Stdio::null())
+            .output()
+            .context("node could not be started: `./test setup` installs it")?;
+        ensure!(
+            output.status.success(),
+            "rp2040js: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let mut report: Report = serde_json::from_slice(&output.stdout)?;
+        report.replay = Replay::from_bytes(&fs::read(&self.telemetry)?)?;
+        Ok(Some(report))
+    }
+}
+
+impl Report {
+    /// Share of the core's time that it was awake.
+    #[must_use]
+    pub fn load(&self) -> f64 {
+        self.cycles as f64 / (self.cycles + self.sleeping) as f64
+    }
+}

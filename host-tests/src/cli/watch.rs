@@ -1,0 +1,257 @@
+//! `watch`: draws what a board sends while it sends.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use beamfix_app::command::Command;
+use host_tests::board::{Board, recording, stream::Stream};
+use host_tests::encoder::ld06::Sensor;
+use host_tests::picture;
+use host_tests::sim::drive::{Settings, drive};
+use host_tests::watch::Watch;
+use serde_json::json;
+
+use super::output;
+
+/// Follow a board by its telemetry: a picture that is drawn again and again, a line on stderr, and, where the board sends
+/// it, a recording of the lidar's bytes that `replay` reads.
+///
+/// A serial line must have been set up: stty -F /dev/ttyACM0 raw 921600.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Where the frames come from: a file or a serial line, `tcp:HOST:PORT`, or `-` for standard input.
+    #[arg(required_unless_present = "board")]
+    source: Option<String>,
+    /// Start this emulated board and drive it through the simulated flat.
+    #[arg(long, value_name = "NAME", conflicts_with = "source")]
+    board: Option<String>,
+    /// How long the simulated drive takes.
+    #[arg(long, default_value_t = 60.0, value_name = "S")]
+    seconds: f64,
+    /// The picture.
+    #[arg(long, value_name = "FILE", default_value = "target/beamfix/live.png")]
+    out: PathBuf,
+    /// Seconds between two pictures.
+    #[arg(long, default_value_t = 1.0, value_name = "S")]
+    every: f64,
+    /// Ask the board for the lidar's bytes and write them here.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Stop after so many poses.
+    #[arg(long, value_name = "N")]
+    poses: Option<u32>,
+    /// Print one JSON object at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Bytes of an LD06 a second.
+const RATE: f64 = 4500.0 / 12.0 * 47.0;
+
+/// Reads until the end, draws.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    if !(args.every.is_finite() && args.every >= 0.0) {
+        bail!("--every {}: not a time", args.every);
+    }
+    if !(args.seconds.is_finite() && args.seconds > 0.0) {
+        bail!("--seconds {}: not a time", args.seconds);
+    }
+    let recording = args.record.as_deref().map(output::create).transpose()?;
+    let mut live = Live {
+        args,
+        watch: Watch::new(recording)?,
+        drawn: Instant::now(),
+    };
+    if let Some(folder) = args.out.parent() {
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    }
+    match (&args.board, args.source.as_deref()) {
+        (Some(name), _) => live.board(Board::named(name)?)?,
+        (None, Some("-")) => live.follow(io::stdin().lock(), "-")?,
+        (None, Some(source)) => match source.strip_prefix("tcp:") {
+            Some(address) => {
+                let stream = TcpStream::connect(address)
+                    .with_context(|| format!("{source}: no connection"))?;
+                let mut commands = stream.try_clone()?;
+                live.ask(&mut commands);
+                live.follow(stream, source)?;
+            }
+            None => {
+                let file = File::open(source).with_context(|| source.to_owned())?;
+                // A serial line takes commands too; a file does not.
+                if !file.metadata()?.is_file()
+                    && let Ok(mut commands) = File::options().append(true).open(source)
+                {
+                    live.ask(&mut commands);
+                }
+                live.follow(file, source)?;
+            }
+        },
+        (None, None) => bail!("neither a source nor a board"),
+    }
+    live.finish()
+}
+
+struct Live<'a> {
+    args: &'a Args,
+    watch: Watch<BufWriter<File>>,
+    drawn: Instant,
+}
+
+impl Live<'_> {
+    /// Reads a source to its end.
+    fn follow(&mut self, mut source: impl Read, name: &str) -> Result<()> {
+        let mut bytes = [0; 4096];
+        loop {
+            let n = match source.read(&mut bytes) {
+                Ok(n) => n,
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                Err(error) => return Err(error).with_context(|| name.to_owned()),
+            };
+            self.watch.push(&bytes[..n])?;
+            if n == 0 || self.is_enough() {
+                return Ok(());
+            }
+            self.show()?;
+        }
+    }
+
+    /// Asks whoever listens for beams, and for the lidar's bytes where they are recorded.
+    fn ask(&self, commands: &mut impl Write) {
+        let mut asked = recording::Recording::new();
+        asked.send(&Command::Send {
+            raw: self.args.record.is_some(),
+            scans: true,
+        });
+        asked.ask_health();
+        let _ = commands.write_all(asked.bytes());
+    }
+
+    /// Drives an emulated board through the flat, at the lidar's own speed.
+    fn board(&mut self, board: &Board) -> Result<()> {
+        let settings = Settings {
+            seconds: self.args.seconds,
+            ..Settings::DEFAULT
+        };
+        let bytes = drive(&settings, &mut Sensor::ld06()).bytes;
+        let mut stream = Stream::open(board)?;
+        if let Some(commands) = stream.commands() {
+            self.ask(commands);
+            self.until_health(&mut stream)?;
+        } else if self.args.record.is_some() {
+            bail!("--record: {} has no line for commands", board.name);
+        }
+        let mut lidar = stream.lidar()?;
+        let feeder = thread::spawn(move || -> io::Result<()> {
+            let start = Instant::now();
+            for (k, packet) in bytes.chunks(47).enumerate() {
+                let due = Duration::from_secs_f64(k as f64 * 47.0 / RATE);
+                thread::sleep(due.saturating_sub(start.elapsed()));
+                lidar.write_all(packet)?;
+            }
+            Ok(())
+        });
+        let mut bytes = [0; 4096];
+        while !feeder.is_finished() && !self.is_enough() {
+            let n = stream.read_for(&mut bytes, Duration::from_millis(100))?;
+            self.watch.push(&bytes[..n])?;
+            self.show()?;
+        }
+        if !self.is_enough() {
+            match feeder.join() {
+                Ok(fed) => fed.context("the board takes no more bytes")?,
+                Err(_) => bail!("the lidar's thread ended early"),
+            }
+        }
+        // What is still on its way: until nothing comes.
+        loop {
+            let n = stream.read_for(&mut bytes, Duration::from_millis(1000))?;
+            self.watch.push(&bytes[..n])?;
+            if n == 0 || self.is_enough() {
+                break;
+            }
+        }
+        if let Some(commands) = stream.commands() {
+            self.ask(commands);
+            self.until_health(&mut stream)?;
+        }
+        Ok(())
+    }
+
+    fn until_health(&mut self, stream: &mut Stream) -> Result<()> {
+        self.watch.health = None;
+        let mut bytes = [0; 4096];
+        for _ in 0..100 {
+            let n = stream.read_for(&mut bytes, Duration::from_millis(100))?;
+            self.watch.push(&bytes[..n])?;
+            if self.watch.health.is_some() {
+                return Ok(());
+            }
+        }
+        bail!("the board does not answer a command")
+    }
+
+    fn is_enough(&self) -> bool {
+        self.args
+            .poses
+            .is_some_and(|poses| self.watch.poses >= poses)
+    }
+
+    /// Draws, where it is time to.
+    fn show(&mut self) -> Result<()> {
+        if self.drawn.elapsed().as_secs_f64() >= self.args.every {
+            self.draw()?;
+            eprintln!("{}", self.watch.status());
+        }
+        Ok(())
+    }
+
+    fn draw(&mut self) -> Result<()> {
+        let from = self.args.board.as_deref().or(self.args.source.as_deref());
+        let title = format!("beamfix: live from {}", from.unwrap_or("-"));
+        // Whoever looks at it never sees half a picture.
+        let is_svg = self.args.out.extension().is_some_and(|end| end == "svg");
+        let next = self
+            .args
+            .out
+            .with_extension(if is_svg { "next.svg" } else { "next.png" });
+        picture::save(&self.watch.map(&title), &next)?;
+        replace(&next, &self.args.out)?;
+        self.drawn = Instant::now();
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<ExitCode> {
+        self.watch.finish()?;
+        if self.watch.poses == 0 {
+            let counters = self.watch.counters();
+            bail!(
+                "no pose: {} frames understood, {} damaged",
+                counters.frames,
+                counters.errors
+            );
+        }
+        self.draw()?;
+        let watch = &self.watch;
+        let counters = watch.counters();
+        let value = json!({
+            "poses": watch.poses, "missing": watch.missing, "starts": watch.starts,
+            "frames": counters.frames, "damaged": counters.errors,
+            "recorded_bytes": watch.recorded, "pose_hash": watch.hash.to_string(),
+            "bytes_lost": watch.health.map(|health| health.bytes_lost),
+        });
+        let text = format!("{}\n{}", watch.status(), self.args.out.display());
+        output::report(self.args.json, &value, &text)?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+fn replace(new: &Path, old: &Path) -> Result<()> {
+    fs::rename(new, old).with_context(|| old.display().to_string())
+}

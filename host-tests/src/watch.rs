@@ -1,0 +1,223 @@
+//! Following a board by what it sends: its path, what its lidar sees, how it is; and a recording of the lidar's bytes.
+
+use std::io::{self, Write};
+
+use beamfix::geometry::{Point, Pose};
+use beamfix_app::{
+    link::{Counters, Receiver},
+    telemetry::{Health, Ready, Telemetry},
+};
+
+use crate::{
+    hash::PoseHash,
+    picture::{
+        colour,
+        map::{Map, Path},
+    },
+    timed::{Content, Recorder},
+};
+
+/// About so many points are drawn.
+const POINTS: usize = 60_000;
+
+/// What has come from a board so far.
+pub struct Watch<W> {
+    receiver: Receiver,
+    recorder: Option<Recorder<W>>,
+    /// Starts of the board.
+    pub starts: u32,
+    /// What it said at its start.
+    pub ready: Option<Ready>,
+    /// How it was last.
+    pub health: Option<Health>,
+    /// Poses.
+    pub poses: u32,
+    /// Poses that are missing, by their numbers.
+    pub missing: u32,
+    /// Over all poses.
+    pub hash: PoseHash,
+    /// The last pose.
+    pub pose: Option<beamfix_app::telemetry::Pose>,
+    /// Bytes recorded.
+    pub recorded: usize,
+    /// The board's clock, unwrapped (µs).
+    clock_us: Option<u64>,
+    path: Vec<[f64; 2]>,
+    truth: Vec<[f64; 2]>,
+    /// Beams of the revolution in progress, in the robot's frame.
+    turn: Vec<Point>,
+    turns: usize,
+    points: Vec<[f64; 2]>,
+}
+
+impl<W: Write> Watch<W> {
+    /// Nothing so far; the lidar's bytes go into `recording`.
+    pub fn new(recording: Option<W>) -> io::Result<Self> {
+        let mut recorder = recording.map(Recorder::new).transpose()?;
+        if let Some(recorder) = &mut recorder {
+            recorder.push(0, Content::Lidar("ld06"))?;
+        }
+        Ok(Self {
+            receiver: Receiver::new(),
+            recorder,
+            starts: 0,
+            ready: None,
+            health: None,
+            poses: 0,
+            missing: 0,
+            hash: PoseHash::new(),
+            pose: None,
+            recorded: 0,
+            clock_us: None,
+            path: Vec::new(),
+            truth: Vec::new(),
+            turn: Vec::new(),
+            turns: 0,
+            points: Vec::new(),
+        })
+    }
+
+    /// Takes bytes that came from the board.
+    pub fn push(&mut self, bytes: &[u8]) -> io::Result<()> {
+        for &byte in bytes {
+            if let Some(message) = self.receiver.push::<Telemetry>(byte) {
+                self.take(message)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Frames seen and damaged.
+    pub fn counters(&self) -> Counters {
+        self.receiver.counters()
+    }
+
+    /// Ends the recording.
+    pub fn finish(&mut self) -> io::Result<()> {
+        match self.recorder.take() {
+            Some(recorder) => recorder.finish().map(drop),
+            None => Ok(()),
+        }
+    }
+
+    fn take(&mut self, message: Telemetry) -> io::Result<()> {
+        match message {
+            Telemetry::Ready(ready) => {
+                self.starts += 1;
+                self.ready = Some(ready);
+                // It starts from the origin again.
+                self.pose = None;
+            }
+            Telemetry::Pose(pose) => {
+                if let Some(last) = &self.pose {
+                    let step = pose.sequence.wrapping_sub(last.sequence);
+                    self.missing += u32::from(step).saturating_sub(1);
+                }
+                let [x, y, theta] = pose.pose;
+                self.hash.push(Pose { x, y, theta });
+                self.path.push([x.into(), y.into()]);
+                self.poses += 1;
+                self.pose = Some(pose);
+            }
+            Telemetry::Health(health) => self.health = Some(health),
+            Telemetry::Truth(truth) => {
+                self.truth
+                    .push([truth.pose[0].into(), truth.pose[1].into()]);
+            }
+            Telemetry::Raw(raw) => {
+                let last = self.clock_us.unwrap_or(raw.time_us.into());
+                let passed = raw.time_us.wrapping_sub(last as u32);
+                let now = last + u64::from(passed);
+                self.clock_us = Some(now);
+                self.recorded += raw.bytes.len();
+                if let Some(recorder) = &mut self.recorder {
+                    recorder.push(now, Content::Bytes(&raw.bytes))?;
+                }
+            }
+            Telemetry::Scan(piece) => {
+                for (k, (bearing, mm)) in piece.beams().enumerate() {
+                    if piece.turn_start == Some(k as u8) {
+                        self.place();
+                    }
+                    if mm > 0 {
+                        let (s, c) = beamfix::math::sin_cos(bearing.radians());
+                        let metres = f32::from(mm) / 1000.0;
+                        self.turn.push(Point::new(metres * c, metres * s));
+                    }
+                }
+            }
+            Telemetry::Cost(_) => {}
+        }
+        Ok(())
+    }
+
+    /// The revolution is complete: where its points are, the pose that came just before says.
+    fn place(&mut self) {
+        let turn = std::mem::take(&mut self.turn);
+        let Some(pose) = &self.pose else {
+            return;
+        };
+        let [x, y, theta] = pose.pose;
+        let robot = Pose { x, y, theta };
+        self.turns += 1;
+        // Of a long run, a part of all revolutions.
+        if self.points.len() > POINTS {
+            let mut k = 0;
+            self.points.retain(|_| {
+                k += 1;
+                k % 2 == 0
+            });
+        }
+        self.points.extend(turn.into_iter().map(|point| {
+            let seen = robot * point;
+            [f64::from(seen.x), f64::from(seen.y)]
+        }));
+    }
+
+    /// One line: how it is.
+    pub fn status(&self) -> String {
+        let counters = self.counters();
+        let pose = self.pose.as_ref().map_or_else(String::new, |pose| {
+            let [x, y, theta] = pose.pose;
+            format!(
+                ", x {x:.3} m, y {y:.3} m, heading {:.2}°, {:?}, {} of {} beams agree",
+                theta.to_degrees(),
+                pose.verdict,
+                pose.inliers,
+                pose.beams
+            )
+        });
+        let health = self.health.as_ref().map_or_else(String::new, |health| {
+            format!(
+                ", lidar {:?}, {} bytes lost, {} packets damaged",
+                health.lidar, health.bytes_lost, health.check_errors
+            )
+        });
+        format!(
+            "{} poses ({} missing), {} frames damaged{pose}{health}",
+            self.poses, self.missing, counters.errors
+        )
+    }
+
+    /// Everything so far.
+    pub fn map(&self, title: &str) -> Map {
+        let path = |name: &str, colour, width, places: &Vec<[f64; 2]>| Path {
+            name: name.into(),
+            colour,
+            width,
+            places: places.clone(),
+        };
+        let mut paths = Vec::new();
+        if !self.truth.is_empty() {
+            paths.push(path("true path", colour::GREEN, 5, &self.truth));
+        }
+        paths.push(path("the board's path", colour::RED, 2, &self.path));
+        Map {
+            title: title.into(),
+            caption: self.status(),
+            world: None,
+            points: self.points.clone(),
+            paths,
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! Bytes over the boards' UARTs: none lost, and what is damaged on the line costs packets, not the run.
+//!
+//! Three minutes on each board (a quarter of an hour in all):
+//! `cargo test --release --test boards_uart -- --ignored --nocapture`
+
+use beamfix_app::{BEAMS, ring::Ring, telemetry::Telemetry};
+use host_tests::{
+    board::{
+        BOARDS, Board, Replay, STM32F4, difference, recording::Recording, rp2040js::Job, stream,
+    },
+    encoder::ld06::Sensor,
+    sim::drive::{Settings, drive},
+};
+
+fn ld06(seconds: f64) -> Vec<u8> {
+    let settings = Settings {
+        seconds,
+        ..Settings::DEFAULT
+    };
+    drive(&settings, &mut Sensor::ld06()).bytes
+}
+
+fn boards() -> impl Iterator<Item = &'static Board> {
+    BOARDS.iter().chain([&STM32F4])
+}
+
+/// A hundredth of the bytes is lost, doubled or has a bit flipped, as many of each.
+fn damaged(bytes: &[u8]) -> Vec<u8> {
+    let mut random = 1u64;
+    let mut damaged = Vec::new();
+    for &byte in bytes {
+        random = random
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        match (random >> 33) % 300 {
+            0 => {}
+            1 => damaged.extend([byte, byte]),
+            2 => damaged.push(byte ^ 1 << (random >> 60 & 7)),
+            _ => damaged.push(byte),
+        }
+    }
+    damaged
+}
+
+/// What the application makes of these bytes here.
+fn here(bytes: &[u8]) -> Replay {
+    let mut recording = Recording::new();
+    recording.lidar(bytes);
+    recording.ask_health();
+    Replay::on_host(&recording, BEAMS)
+}
+
+/// Every message of the board is the host's, so no byte was lost and every pose is out.
+fn run(board: &Board, bytes: &[u8], least: usize) {
+    let poses = stream::compare(board, bytes).unwrap_or_else(|error| panic!("{error:#}"));
+    println!("{}: {} bytes, {poses} poses", board.name, bytes.len());
+    assert!(poses >= least, "{}: {poses} poses", board.name);
+}
+
+#[test]
+fn no_byte_is_lost_and_every_pose_is_out() {
+    let bytes = ld06(5.0);
+    for board in boards() {
+        run(board, &bytes, 47);
+    }
+}
+
+#[test]
+fn a_damaged_line_resets_no_board() {
+    // `compare` expects the one ready frame of the start, and then the same messages as here: a reset would send another.
+    let bytes = damaged(&ld06(10.0));
+    for board in boards() {
+        run(board, &bytes, 30);
+    }
+}
+
+#[test]
+#[ignore = "ten minutes: cargo test --release --test boards_uart -- --ignored --nocapture"]
+fn three_minutes_without_a_loss_on_every_board() {
+    let bytes = ld06(180.0);
+    for board in boards() {
+        run(board, &bytes, 1795);
+    }
+}
+
+#[test]
+#[ignore = "ten minutes: cargo test --release --test boards_uart -- --ignored --nocapture"]
+fn three_minutes_on_a_damaged_line_on_every_board() {
+    let bytes = damaged(&ld06(180.0));
+    let health = here(&bytes).messages;
+    println!("{:?}", health.last());
+    for board in boards() {
+        run(board, &bytes, 900);
+    }
+}
+
+/// Bytes at their exact times into the Pico's firmware: nothing overruns while a match is computed.
+fn at_exact_times(seconds: f64) {
+    let bytes = ld06(seconds);
+    let Some(report) = Job::ld06(&bytes)
+        .run()
+        .unwrap_or_else(|error| panic!("{error:#}"))
+    else {
+        return;
+    };
+    println!(
+        "{} bytes in {:.1} s, {} overruns, {} poses, core awake {:.1} %",
+        report.sent,
+        report.seconds,
+        report.overruns,
+        report.replay.poses().count(),
+        100.0 * report.load()
+    );
+    assert_eq!((report.sent, report.overruns), (bytes.len(), 0));
+    assert!((report.seconds - seconds).abs() < 0.1);
+    let here = here(&bytes);
+    assert_eq!(difference(here.poses(), report.replay.poses()), None);
+    assert!(report.load() < 0.5, "awake {:.3}", report.load());
+    for message in &report.replay.messages {
+        if let Telemetry::Health(health) = message {
+            assert_eq!((health.bytes_lost, health.check_errors), (0, 0));
+        }
+    }
+}
+
+#[test]
+fn a_pico_has_no_overrun_at_exact_byte_times() {
+    at_exact_times(5.0);
+}
+
+#[test]
+#[ignore = "six minutes: cargo test --release --test boards_uart -- --ignored --nocapture"]
+fn a_pico_has_no_overrun_in_three_minutes_at_exact_byte_times() {
+    at_exact_times(180.0);
+}
+
+#[test]
+fn a_pico_counts_and_survives_forced_overruns() {
+    let bytes = ld06(8.0);
+    let mut job = Job::ld06(&bytes);
+    // The UART holds 32 bytes: now and then 100 come at once, as if interrupts had been masked for 4 ms.
+    job.bursts = (1..8).map(|second| (second * 17_625, 100)).collect();
+    let Some(report) = job.run().unwrap_or_else(|error| panic!("{error:#}")) else {
+        return;
+    };
+    let poses: Vec<_> = report.replay.poses().collect();
+    let health = report
+        .replay
+        .messages
+        .iter()
+        .rev()
+        .find_map(|message| match message {
+            Telemetry::Health(health) => Some(health),
+            _ => None,
+        });
+    let health = health.expect("a health message every 16 revolutions");
+    println!(
+        "{} bytes lost in {} poses, {health:?}",
+        report.overruns,
+        poses.len()
+    );
+    assert!(report.overruns > 300, "{}", report.overruns);
+    // The chip tells of a loss, not how large it was.
+    assert!((1..=report.overruns).contains(&health.bytes_lost));
+    assert!(health.skipped_bytes > 0);
+    // No reset, and no revolution without a pose.
+    let readies = |message: &&Telemetry| matches!(message, Telemetry::Ready(_));
+    assert_eq!(report.replay.messages.iter().filter(readies).count(), 1);
+    assert!(poses.len() >= 75, "{} poses", poses.len());
+    for (k, pose) in poses.iter().enumerate() {
+        assert_eq!(usize::from(pose.sequence), k);
+    }
+}
+
+#[test]
+fn a_ring_counts_what_it_has_no_room_for() {
+    let ring = Ring::<16>::new();
+    (0..20).for_each(|byte| ring.push(byte));
+    ring.lose(3);
+    assert_eq!(ring.lost(), 7);
+    let kept: Vec<u8> = std::iter::from_fn(|| ring.pop()).collect();
+    assert_eq!(kept, (0..16).collect::<Vec<u8>>());
+    assert!(ring.is_empty());
+}

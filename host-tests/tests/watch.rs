@@ -1,0 +1,141 @@
+//! `watch`: an emulated board is followed live, drawn, and recorded; the recording replays to the same bits.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use beamfix_app::{App, AppConfig, CONFIG, telemetry::Reset};
+use host_tests::encoder::ld06::Sensor;
+use host_tests::sim::drive::{Settings, drive};
+use serde_json::Value;
+
+fn folder(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::create_dir_all(&path).expect("a folder for the test");
+    path
+}
+
+fn beamfix(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_beamfix"))
+        .args(arguments)
+        .output()
+        .expect("the tool starts")
+}
+
+fn json(output: &Output) -> Value {
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a plain path")
+}
+
+/// PNG, and large enough to hold a drawing.
+fn is_picture(path: &Path) {
+    let png = fs::read(path).expect("a picture");
+    assert!(png.starts_with(b"\x89PNG"));
+    assert!(png.len() > 10_000, "{} bytes", png.len());
+}
+
+#[test]
+fn a_board_is_drawn_and_its_recording_replays_to_the_same_bits() {
+    let folder = folder("watch-board");
+    let (picture, recording) = (folder.join("live.png"), folder.join("lidar.rec"));
+    let _ = fs::remove_file(&picture);
+    let watched = json(&beamfix(&[
+        "watch",
+        "--board",
+        "m4f",
+        "--seconds",
+        "6",
+        "--out",
+        text(&picture),
+        "--record",
+        text(&recording),
+        "--json",
+    ]));
+    println!("{watched}");
+    let poses = watched["poses"].as_u64().expect("a number");
+    assert!(poses >= 57, "{poses} poses");
+    for (key, value) in [("missing", 0), ("damaged", 0), ("bytes_lost", 0)] {
+        assert_eq!(watched[key], value, "{key}");
+    }
+    is_picture(&picture);
+    let replayed = json(&beamfix(&["replay", text(&recording), "--json"]));
+    assert_eq!(replayed["scans"], watched["poses"]);
+    assert_eq!(replayed["pose_hash"], watched["pose_hash"]);
+}
+
+#[test]
+fn frames_of_a_file_are_drawn_and_recorded_to_the_byte() {
+    let folder = folder("watch-file");
+    let settings = Settings {
+        seconds: 3.0,
+        ..Settings::DEFAULT
+    };
+    let bytes = drive(&settings, &mut Sensor::ld06()).bytes;
+    let config = AppConfig {
+        record: true,
+        scans: true,
+        ..CONFIG
+    };
+    let mut app = Box::new(App::<{ beamfix_app::BEAMS }>::new(config));
+    let mut sent = app.ready(Reset::Power).to_vec();
+    for (k, &byte) in bytes.iter().enumerate() {
+        // From just before the clock wraps.
+        app.set_time((k as u32 * 57).wrapping_sub(1_000_000));
+        sent.extend_from_slice(app.lidar(byte));
+    }
+    let frames = folder.join("frames.bin");
+    fs::write(&frames, &sent).expect("the test's file");
+    let (picture, recording) = (folder.join("live.png"), folder.join("lidar.rec"));
+    let watched = json(&beamfix(&[
+        "watch",
+        text(&frames),
+        "--out",
+        text(&picture),
+        "--record",
+        text(&recording),
+        "--json",
+    ]));
+    is_picture(&picture);
+    assert_eq!(
+        (&watched["damaged"], &watched["missing"]),
+        (&0.into(), &0.into())
+    );
+    let file = fs::read(&recording).expect("a recording");
+    let kept = host_tests::timed::plain(&file);
+    // The last packet may still wait for more.
+    assert!(bytes.starts_with(&kept) && kept.len() + 47 >= bytes.len());
+    let times: Vec<u64> = host_tests::timed::pieces(&file)
+        .iter()
+        .skip(1)
+        .filter_map(|piece| piece.time_us)
+        .collect();
+    assert!(times.is_sorted(), "{times:?}");
+    assert_eq!(times[1] - times[0], 47 * 57);
+}
+
+#[test]
+fn what_is_no_telemetry_is_refused() {
+    let folder = folder("watch-noise");
+    let noise = folder.join("noise.bin");
+    fs::write(&noise, [7; 1000]).expect("the test's file");
+    for (source, word) in [
+        (text(&noise), "no pose"),
+        ("/nowhere/at/all", "/nowhere"),
+        ("tcp:127.0.0.1:1", "tcp:127.0.0.1:1"),
+    ] {
+        let output = beamfix(&["watch", source, "--out", text(&folder.join("live.png"))]);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{source}: {stderr}");
+        assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
+        assert!(stderr.contains(word), "{source}: {stderr}");
+    }
+}
