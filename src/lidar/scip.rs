@@ -295,12 +295,23 @@ pub(super) fn survey(bytes: &[u8]) -> super::identify::Survey {
         }
         if checked(text).is_some() {
             survey.frames += 1;
-            survey.covered_bytes += line.len() as u32 + 1;
-        } else {
+        } else if !is_echo(text) {
             survey.check_errors += 1;
+            continue;
         }
+        survey.covered_bytes += line.len() as u32 + 1;
     }
     survey
+}
+
+/// Whether a line may be the echo of a command that asks for scans: it has no check character.
+fn is_echo(line: &[u8]) -> bool {
+    match *line {
+        [b'M' | b'G', b'D' | b'S', ref numbers @ ..] => {
+            numbers.len() >= 10 && numbers.iter().all(u8::is_ascii_digit)
+        }
+        _ => false,
+    }
 }
 
 /// Check character of a line.
