@@ -138,6 +138,11 @@ impl Board {
         self.firmware.build(program)
     }
 
+    /// Builds one of the board's tests; gives the ELF file.
+    pub fn build_test(&self, test: &str) -> Result<PathBuf> {
+        self.firmware.build_test(test)
+    }
+
     /// Runs the application over a recording, in the emulator; the costs are worth something with [`Count::Exact`].
     pub fn replay(&self, recording: &Recording, count: Count) -> Result<Replay> {
         let elf = self.build("replay")?;

@@ -3,6 +3,7 @@
 //!
 //! In integers, so that a board without a floating point unit keeps up with it, and everywhere the same bytes.
 
+use crate::App;
 use beamfix::{
     geometry::Pose,
     lidar::ld06::{FRAME, POINTS, check_code},
@@ -176,6 +177,41 @@ impl Demo {
             sum += (self.random >> 16) as i32 * (2 * NOISE_MM + 1) >> 16;
         }
         sum / 2 - 2 * NOISE_MM
+    }
+}
+
+/// The first poses of the demo as one number: what a board can prove itself by.
+pub struct FirstPoses {
+    /// How many.
+    pub count: u32,
+    /// FNV-1a over the bits of each pose's x, y and heading, little endian.
+    pub hash: u64,
+}
+
+/// What every machine finds; the host's tests have found it too.
+pub const FIRST_POSES: FirstPoses = FirstPoses {
+    count: 30,
+    hash: 0x9b7b_b250_71a2_779c,
+};
+
+impl FirstPoses {
+    /// What this machine finds.
+    pub fn find<const N: usize>(&self, app: &mut App<N>, demo: &mut Demo) -> u64 {
+        let mut hash = 0xcbf2_9ce4_8422_2325;
+        let mut seen = 0;
+        while seen < self.count {
+            for byte in demo.packet() {
+                let _ = app.lidar(byte);
+            }
+            if app.seen().turns != seen {
+                seen = app.seen().turns;
+                let Pose { x, y, theta } = app.pose();
+                for byte in [x, y, theta].into_iter().flat_map(f32::to_le_bytes) {
+                    hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+                }
+            }
+        }
+        hash
     }
 }
 

@@ -61,6 +61,17 @@ pub fn demo(board: &Board) -> Result<Command> {
     Ok(command)
 }
 
+/// Runs one test of an ELF file made with embedded-test, as probe-rs does: by its address. Gives the exit status.
+pub fn run_test(board: &Board, elf: &Path, address: u32) -> Result<i32> {
+    let mut command = start(board, elf);
+    command
+        .args(["-serial", "none", "-semihosting-config"])
+        .arg(format!(
+            "enable=on,target=native,arg=run_addr,arg={address}"
+        ));
+    Running::spawn(&mut command, board)?.wait(Duration::from_secs(60))
+}
+
 /// The emulator with a program, without any connection to it.
 pub(super) fn start(board: &Board, elf: &Path) -> Command {
     let mut command = Command::new(board.emulator);

@@ -82,4 +82,34 @@ impl Firmware {
         fs::copy(&built, &kept).with_context(|| built.display().to_string())?;
         Ok(kept)
     }
+
+    /// Builds its test of this name for the board; gives the ELF file.
+    pub fn build_test(&self, test: &str) -> Result<PathBuf> {
+        let folder = root().join("boards").join(self.package);
+        let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+            .args(["test", "--release", "--no-run", "--test", test])
+            .args(["--message-format", "json"])
+            .arg("--target-dir")
+            .arg(root().join("target/boards"))
+            .current_dir(&folder)
+            .env_remove("RUSTFLAGS")
+            .env_remove("CARGO_ENCODED_RUSTFLAGS")
+            .env_remove("CARGO_BUILD_TARGET")
+            .stdin(Stdio::null())
+            .output()
+            .with_context(|| format!("cargo could not be started in {}", folder.display()))?;
+        let messages = String::from_utf8_lossy(&output.stdout);
+        let built = messages
+            .lines()
+            .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+            .filter_map(|message| Some(PathBuf::from(message["executable"].as_str()?)))
+            .last();
+        built.with_context(|| {
+            format!(
+                "boards/{}: the test {test} does not build:\n{}",
+                self.package,
+                String::from_utf8_lossy(&output.stderr)
+            )
+        })
+    }
 }
