@@ -3,21 +3,16 @@
 //! Three minutes on each board (a quarter of an hour in all):
 //! `cargo test --release --test boards_uart -- --ignored --nocapture`
 
-use beamfix_app::{BEAMS, ring::Ring, telemetry::Telemetry};
-use host_tests::{
-    board::{
-        BOARDS, Board, Replay, STM32F4, difference, recording::Recording, rp2040js::Job, stream,
-    },
-    encoder::ld06::Sensor,
-    sim::drive::{Settings, drive},
+use beamfix_app::{BEAMS, demo::Demo, ring::Ring, telemetry::Telemetry};
+use host_tests::board::{
+    BOARDS, Board, Replay, STM32F4, difference, recording::Recording, rp2040js::Job, stream,
 };
 
+/// Of the demo's robot, which drives in a circle as long as one likes.
 fn ld06(seconds: f64) -> Vec<u8> {
-    let settings = Settings {
-        seconds,
-        ..Settings::DEFAULT
-    };
-    drive(&settings, &mut Sensor::ld06()).bytes
+    let mut demo = Demo::new();
+    let packets = (seconds * 4500.0 / 12.0) as usize;
+    (0..packets).flat_map(|_| demo.packet()).collect()
 }
 
 fn boards() -> impl Iterator<Item = &'static Board> {
@@ -78,9 +73,12 @@ fn a_damaged_line_resets_no_board() {
 #[ignore = "ten minutes: cargo test --release --test boards_uart -- --ignored --nocapture"]
 fn three_minutes_without_a_loss_on_every_board() {
     let bytes = ld06(180.0);
-    for board in boards() {
-        run(board, &bytes, 1795);
-    }
+    std::thread::scope(|scope| {
+        for board in boards() {
+            let bytes = &bytes;
+            scope.spawn(move || run(board, bytes, 1795));
+        }
+    });
 }
 
 #[test]
@@ -89,9 +87,12 @@ fn three_minutes_on_a_damaged_line_on_every_board() {
     let bytes = damaged(&ld06(180.0));
     let health = here(&bytes).messages;
     println!("{:?}", health.last());
-    for board in boards() {
-        run(board, &bytes, 900);
-    }
+    std::thread::scope(|scope| {
+        for board in boards() {
+            let bytes = &bytes;
+            scope.spawn(move || run(board, bytes, 900));
+        }
+    });
 }
 
 /// Bytes at their exact times into the Pico's firmware: nothing overruns while a match is computed.

@@ -103,7 +103,7 @@ impl Firmware {
             .lines()
             .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
             .filter_map(|message| Some(PathBuf::from(message["executable"].as_str()?)))
-            .last();
+            .next_back();
         built.with_context(|| {
             format!(
                 "boards/{}: the test {test} does not build:\n{}",
