@@ -5,7 +5,8 @@
 //! ```
 //!
 //! One file a protocol family, each with a `Parser` that implements [`Protocol`] and a `Packet` that implements
-//! [`Packet`]. A [`Model`] is a row of data on a family. Parsers do no I/O; `io`, behind the features `embedded-io`,
+//! [`Packet`]. A [`Model`] is a row of data on a family; [`choice`] finds its parser where it is known only at run time,
+//! [`identify`] finds the model where nobody knows it, [`startup`] wakes it. Parsers do no I/O; `io`, behind the features `embedded-io`,
 //! `embedded-io-async` and `embedded-hal-nb`, connects them to a UART.
 //!
 //! | file | sensors | checked against |

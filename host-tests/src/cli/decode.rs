@@ -81,7 +81,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         points,
     } = summary;
     let value = json!({
-        "lidar": model.name, "hints": hints, "bytes": bytes.len(), "packets": packets, "check_errors": check_errors,
+        "lidar": model.name, "baud": model.baud, "hints": hints, "bytes": bytes.len(), "packets": packets, "check_errors": check_errors,
         "skipped_bytes": skipped_bytes, "tail_bytes": tail_bytes, "scans": scans, "points": points,
     });
     let mut text = format!(
