@@ -35,6 +35,9 @@ use search::Search;
 pub struct LocalizerConfig {
     /// Below this quality a scan does not fit (0…1): see [`Quality::value`]. Default 0.38.
     pub fits: f32,
+    /// Nor does one of whose beams more than this share went through surfaces. Default 0.18: at the right pose up to a
+    /// sixth of them graze edges; at the other end of a corridor that looks much the same it is a fifth.
+    pub through: f32,
     /// So many scans in a row that do not fit: lost. Default 3.
     pub patience: u8,
     /// Mean quality from which on a candidate can be the pose. Default 0.55.
@@ -59,6 +62,7 @@ impl LocalizerConfig {
     /// For lidars that see all around, in rooms.
     pub const DEFAULT: Self = Self {
         fits: 0.38,
+        through: 0.18,
         patience: 3,
         accept: 0.55,
         margin: 0.25,
@@ -184,8 +188,8 @@ impl<'a, const N: usize> Localizer<'a, N> {
 
     /// Takes a scan; `motion` is the lidar's since the scan before, by odometry, in its own frame.
     ///
-    /// Tracking costs what [`field::align`] costs, a scan that does not fit a search of [`LocalizerConfig::reach`]
-    /// around, choosing one short match a candidate.
+    /// Tracking costs what [`field::align`] costs, a scan that does not fit as well as a new candidate would have to a
+    /// search of [`LocalizerConfig::reach`] around, choosing one short match a candidate.
     pub fn update(&mut self, points: &[ScanPoint], motion: Pose) -> Verdict {
         self.counters.scans = self.counters.scans.wrapping_add(1);
         let motion = if motion.is_finite() {
@@ -256,10 +260,11 @@ impl<'a, const N: usize> Localizer<'a, N> {
         let fitting = |found: &Match| Quality::of(&field, points, found.pose, N);
         let near = field::align(&field, points, predicted, &self.config.field).ok();
         let mut best = near.map(|found| (found, fitting(&found)));
-        let fits = |best: &Option<(Match, Quality)>| {
-            best.is_some_and(|(_, q)| q.value() >= self.config.fits)
+        let through = self.config.through;
+        let fits = |best: &Option<(Match, Quality)>, value: f32| {
+            best.is_some_and(|(_, q)| q.value() >= value && q.through_share() <= through)
         };
-        if !fits(&best) {
+        if !fits(&best, self.config.accept) {
             let around = CorrelativeConfig {
                 reach: self.config.reach,
                 turn: self.config.turn,
@@ -278,12 +283,17 @@ impl<'a, const N: usize> Localizer<'a, N> {
                 }
             }
         }
-        if let Some((found, quality)) = best.filter(|_| fits(&best)) {
+        if let Some((found, quality)) = best.filter(|_| fits(&best, self.config.fits)) {
             self.pose = found.pose;
             self.bad_scans = 0;
             return Verdict::Tracking(found, quality);
         }
         self.pose = predicted;
+        // Where nothing matches but the scan fits the prediction, somebody stands in the way: nothing says "elsewhere".
+        let unmatched = Quality::of(&field, points, predicted, N);
+        if unmatched.value() >= self.config.accept && unmatched.through_share() <= through {
+            return Verdict::Doubtful(unmatched);
+        }
         self.bad_scans += 1;
         if self.bad_scans >= self.config.patience {
             self.counters.lost = self.counters.lost.wrapping_add(1);
@@ -310,10 +320,10 @@ impl<'a, const N: usize> Localizer<'a, N> {
             rotation_tolerance: 0.001,
             ..self.config.field
         };
-        let some = Some(points)
-            .into_iter()
-            .flat_map(|points| points.iter().step_by(stride(points.len(), N)));
-        let some: heapless::Vec<ScanPoint, N> = some.copied().collect();
+        let mut some = heapless::Vec::<ScanPoint, N>::new();
+        for &point in points.iter().step_by(stride(points.len(), N)) {
+            let _ = some.push(point);
+        }
         self.hypotheses.moved(motion);
         self.hypotheses.weigh(|pose| {
             let found = field::align(&field, &some, pose, &short);

@@ -75,12 +75,19 @@ impl Hypotheses {
             }
             self.list.pop();
         }
-        let place = self
-            .list
-            .iter()
-            .take_while(|old| old.sum >= new.sum)
-            .count();
-        let _ = self.list.insert(place, new);
+        if self.list.push(new).is_err() {
+            return;
+        }
+        // From the end to its place: behind all that are at least as good.
+        let mut rest = self.list.as_mut_slice();
+        while let [.., before, last] = rest {
+            if before.sum >= last.sum {
+                break;
+            }
+            core::mem::swap(before, last);
+            let shorter = rest.len() - 1;
+            rest = rest.get_mut(..shorter).unwrap_or_default();
+        }
     }
 
     /// What a candidate must exceed to be kept.

@@ -183,12 +183,11 @@ fn nearby<const N: usize>(
     };
     let count = points.iter().filter(within).count();
     let stride = crate::matching::correlative::stride(count, N);
-    points
-        .iter()
-        .filter(within)
-        .step_by(stride)
-        .copied()
-        .collect()
+    let mut near = heapless::Vec::new();
+    for &point in points.iter().filter(within).step_by(stride) {
+        let _ = near.push(point);
+    }
+    near
 }
 
 /// Whether a beam that ends off the object's cells went through a face of it, `distance` ± `radius` from the lidar.

@@ -9,6 +9,7 @@ pub mod bench;
 pub mod demo;
 pub mod drivers;
 pub mod fields;
+pub mod maps;
 mod panic;
 pub mod replay;
 pub mod stack;

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -11,6 +11,7 @@ use beamfix::lidar::Model;
 use beamfix::odometry::{Counters, OdometryConfig};
 use beamfix::scan::Mount;
 use host_tests::decode::{self, Summary};
+use host_tests::map_file;
 use host_tests::picture;
 use host_tests::pipeline::Pipeline;
 use host_tests::readers::capture::{self, Turn};
@@ -39,6 +40,10 @@ pub struct Args {
     /// Stop after so many seconds; the round takes about 70.
     #[arg(long, default_value_t = Settings::DEFAULT.seconds)]
     seconds: f64,
+    /// Write the flat as a ROS map too: this YAML file, and a PGM picture beside it. `field` makes a likelihood field
+    /// of it, and `replay --mode localize --map FILE` finds the robot in it.
+    #[arg(long, value_name = "FILE.yaml")]
+    ros_map: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -67,9 +72,31 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         ..Settings::DEFAULT
     };
     let drive = sim::drive(&settings, encoder::for_model(model).as_mut());
+    if let Some(path) = &args.ros_map {
+        write_map(&drive, path)?;
+    }
     let (turns, summary) = record(args, &settings, &drive, model)?;
     let size = size::fitting(turns.iter().map(|turn| &turn.beams[..]));
     sized!(size, follow(args, &settings, drive, &turns, &summary))
+}
+
+/// Side of a cell of a written map (m).
+const CELL: f32 = 0.05;
+
+/// Writes the world that was driven through, with some cells around it, in its own frame.
+fn write_map(drive: &Drive, path: &Path) -> Result<()> {
+    let (low, high) = drive.world.extent();
+    let margin = f64::from(3.0 * CELL);
+    let start = drive.moments.first().context("nothing was driven")?.truth;
+    let map = map_file::of_world(
+        &drive.world,
+        low.map(|side| side - margin),
+        high.map(|side| side + margin),
+        CELL,
+        [start.x, start.y],
+    )?;
+    map_file::write(&map, path)?;
+    Ok(())
 }
 
 /// Records what came over the line, as a robot would, and decodes that; the recording gets the wheels as well.

@@ -30,6 +30,24 @@ pub struct World {
 }
 
 impl World {
+    /// Lower left and upper right corner of all that is there.
+    #[must_use]
+    pub fn extent(&self) -> ([f64; 2], [f64; 2]) {
+        let ends = self
+            .segments
+            .iter()
+            .flat_map(|s| [(s.from, 0.0), (s.to, 0.0)]);
+        let round = self.circles.iter().map(|c| (c.centre, c.radius));
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for (place, radius) in ends.chain(round) {
+            for k in 0..2 {
+                low[k] = low[k].min(place[k] - radius);
+                high[k] = high[k].max(place[k] + radius);
+            }
+        }
+        (low, high)
+    }
+
     /// Adds one straight face.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2]) {
         self.segments.push(Segment { from, to });
