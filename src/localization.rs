@@ -35,9 +35,6 @@ use search::Search;
 pub struct LocalizerConfig {
     /// Below this quality a scan does not fit (0…1): see [`Quality::value`]. Default 0.38.
     pub fits: f32,
-    /// Nor does one of whose beams more than this share went through surfaces. Default 0.18: at the right pose up to a
-    /// sixth of them graze edges; at the other end of a corridor that looks much the same it is a fifth.
-    pub through: f32,
     /// So many scans in a row that do not fit: lost. Default 3.
     pub patience: u8,
     /// Mean quality from which on a candidate can be the pose. Default 0.55.
@@ -62,7 +59,6 @@ impl LocalizerConfig {
     /// For lidars that see all around, in rooms.
     pub const DEFAULT: Self = Self {
         fits: 0.38,
-        through: 0.18,
         patience: 3,
         accept: 0.55,
         margin: 0.25,
@@ -188,8 +184,8 @@ impl<'a, const N: usize> Localizer<'a, N> {
 
     /// Takes a scan; `motion` is the lidar's since the scan before, by odometry, in its own frame.
     ///
-    /// Tracking costs what [`field::align`] costs, a scan that does not fit as well as a new candidate would have to a
-    /// search of [`LocalizerConfig::reach`] around, choosing one short match a candidate.
+    /// Tracking costs what [`field::align`] costs, a scan that does not fit a search of [`LocalizerConfig::reach`]
+    /// around, choosing one short match a candidate.
     pub fn update(&mut self, points: &[ScanPoint], motion: Pose) -> Verdict {
         self.counters.scans = self.counters.scans.wrapping_add(1);
         let motion = if motion.is_finite() {
@@ -260,11 +256,10 @@ impl<'a, const N: usize> Localizer<'a, N> {
         let fitting = |found: &Match| Quality::of(&field, points, found.pose, N);
         let near = field::align(&field, points, predicted, &self.config.field).ok();
         let mut best = near.map(|found| (found, fitting(&found)));
-        let through = self.config.through;
-        let fits = |best: &Option<(Match, Quality)>, value: f32| {
-            best.is_some_and(|(_, q)| q.value() >= value && q.through_share() <= through)
+        let fits = |best: &Option<(Match, Quality)>| {
+            best.is_some_and(|(_, q)| q.value() >= self.config.fits)
         };
-        if !fits(&best, self.config.accept) {
+        if !fits(&best) {
             let around = CorrelativeConfig {
                 reach: self.config.reach,
                 turn: self.config.turn,
@@ -283,17 +278,12 @@ impl<'a, const N: usize> Localizer<'a, N> {
                 }
             }
         }
-        if let Some((found, quality)) = best.filter(|_| fits(&best, self.config.fits)) {
+        if let Some((found, quality)) = best.filter(|_| fits(&best)) {
             self.pose = found.pose;
             self.bad_scans = 0;
             return Verdict::Tracking(found, quality);
         }
         self.pose = predicted;
-        // Where nothing matches but the scan fits the prediction, somebody stands in the way: nothing says "elsewhere".
-        let unmatched = Quality::of(&field, points, predicted, N);
-        if unmatched.value() >= self.config.accept && unmatched.through_share() <= through {
-            return Verdict::Doubtful(unmatched);
-        }
         self.bad_scans += 1;
         if self.bad_scans >= self.config.patience {
             self.counters.lost = self.counters.lost.wrapping_add(1);

@@ -165,3 +165,48 @@ fn intel_is_learned_from_and_localized_in() {
         .count();
     assert_eq!(json["scans"], lines);
 }
+
+#[test]
+fn the_simulated_flat_is_a_map_to_find_oneself_in() {
+    let folder = folder("field-simulated");
+    let (yaml, table) = (folder.join("flat.yaml"), folder.join("flat.field"));
+    let output = beamfix(&[
+        "simulate",
+        "--seconds",
+        "15",
+        "--out",
+        text(&folder),
+        "--ros-map",
+        text(&yaml),
+    ]);
+    assert!(output.status.success(), "{output:?}");
+    let output = beamfix(&["field", text(&yaml), "--out", text(&table)]);
+    assert!(output.status.success(), "{output:?}");
+    let log = folder.join("lidar.rec");
+    let output = beamfix(&[
+        "replay",
+        text(&log),
+        "--mode",
+        "localize",
+        "--map",
+        text(&yaml),
+        "--json",
+    ]);
+    assert!(output.status.success(), "{output:?}");
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    println!("{json}");
+    let number = |key: &str| json[key].as_u64().expect("a number");
+    assert!(10 * number("tracked") >= 9 * number("scans"), "{json}");
+    // An address that cannot be written to is told, with status 2.
+    let nowhere = folder.join("no/such/folder/flat.yaml");
+    let output = beamfix(&[
+        "simulate",
+        "--seconds",
+        "1",
+        "--out",
+        text(&folder),
+        "--ros-map",
+        text(&nowhere),
+    ]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+}

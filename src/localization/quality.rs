@@ -82,12 +82,6 @@ impl Quality {
         }
         (f32::from(self.on_surface) - f32::from(self.through)) / f32::from(self.beams)
     }
-
-    /// Share of beams that passed a surface.
-    #[must_use]
-    pub fn through_share(&self) -> f32 {
-        f32::from(self.through) / f32::from(self.beams.max(1))
-    }
 }
 
 /// The place after `step` times 0.15 m on the way to a coordinate.

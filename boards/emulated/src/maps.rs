@@ -68,8 +68,13 @@ impl Maps {
         let mut sum = self.grids(shape, points, pose)?;
         {
             let grid = Grid::new(shape, &self.cells[..]).ok()?;
-            let made = LikelihoodField::from_map(&grid, &self.squares, &profile, &mut self.other[..]);
-            sum += made.ok()?.as_slice().score(points, pose).nats(profile.scale());
+            let made =
+                LikelihoodField::from_map(&grid, &self.squares, &profile, &mut self.other[..]);
+            sum += made
+                .ok()?
+                .as_slice()
+                .score(points, pose)
+                .nats(profile.scale());
         }
         let stored = stored::parse(flash).ok()?;
         let pyramid = Pyramid::new(stored, &mut self.pyramid).ok()?;
