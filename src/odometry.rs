@@ -1,6 +1,9 @@
 //! Where the robot is by its scans: each matched against a keyframe, with wheel odometry or its own speed as the
 //! guess.
 
+mod motion;
+
+use self::motion::{Motion, Times};
 use crate::{
     geometry::{Pose, Twist},
     linalg::{Covariance, Sym3},
@@ -21,13 +24,14 @@ pub struct OdometryConfig {
     pub min_range: f32,
     /// Longest range that is used (m). Default 32.
     pub max_range: f32,
-    /// Scans of more beams are thinned by averaging neighbours: see [`PointsConfig::enough`]. Default 240: 480 keeps
-    /// all 450 beams of an LD06 and takes twice the time.
+    /// Scans of more beams are thinned by averaging neighbours: see [`PointsConfig::enough`]. Default `u16::MAX`: every
+    /// beam counts. 240 halves the cost for an LD06, and half as many beams again drift half as much again.
     pub enough: u16,
-    /// A new keyframe is made this far from the last one (m). Default 0.5: near enough for most surfaces to be seen by
+    /// A new keyframe is made this far from the last one (m). Default 0.4: near enough for most surfaces to be seen by
     /// both, far enough for errors not to add up often.
     pub keyframe_distance: f32,
-    /// A new keyframe is made this much turned from the last one (rad). Default 0.4.
+    /// A new keyframe is made this much turned from the last one (rad). Default 0.8. While the turn quickens or slows a
+    /// scan is bent as no twist tells: then this and the distance may be twice as much.
     pub keyframe_turn: f32,
     /// A new keyframe is made when fewer than this share of the beams meet the last one's surfaces. Default 0.6.
     pub keyframe_overlap: f32,
@@ -48,9 +52,9 @@ impl OdometryConfig {
         mount: Mount::DEFAULT,
         min_range: 0.05,
         max_range: 32.0,
-        enough: 240,
-        keyframe_distance: 0.5,
-        keyframe_turn: 0.4,
+        enough: u16::MAX,
+        keyframe_distance: 0.4,
+        keyframe_turn: 0.8,
         keyframe_overlap: 0.6,
         max_correction: 0.45,
         prior_error: 0.1,
@@ -138,8 +142,9 @@ pub struct Odometry<const N: usize> {
     keyframe_covariance: Covariance,
     pose: Pose,
     covariance: Covariance,
-    /// Velocity by the last two poses.
-    twist: Twist,
+    motion: Motion,
+    /// The robot where the scan's points were bent back to.
+    seen_from: Pose,
     wheels: Option<Pose>,
     end_us: u32,
     refused_in_a_row: u8,
@@ -159,7 +164,8 @@ impl<const N: usize> Odometry<N> {
             keyframe_covariance: EXACT,
             pose: Pose::IDENTITY,
             covariance: EXACT,
-            twist: Twist::ZERO,
+            motion: Motion::STANDING,
+            seen_from: Pose::IDENTITY,
             wheels: None,
             end_us: 0,
             refused_in_a_row: 0,
@@ -178,10 +184,10 @@ impl<const N: usize> Odometry<N> {
         self.pose
     }
 
-    /// The robot's velocity by the last two scans.
+    /// The robot's velocity during the last scan.
     #[must_use]
     pub const fn twist(&self) -> Twist {
-        self.twist
+        self.motion.twist
     }
 
     /// What happened so far.
@@ -201,42 +207,37 @@ impl<const N: usize> Odometry<N> {
     /// `wheels` is the robot's pose by its wheels at the scan's end, in any fixed frame; `None` means that the last
     /// velocity goes on. A scan without a usable match leaves the guess as the pose, is counted, and says why.
     pub fn update(&mut self, scan: &Scan<N>, wheels: Option<Pose>) -> Step {
-        let seconds = self.elapsed(scan);
-        let motion = self.predicted_motion(wheels, seconds);
-        let predicted = self.pose * motion;
-        let predicted_covariance = self.grown(motion);
-        self.see(scan, motion, seconds);
-        // Wheels that slip tell a wrong motion; to go on as before may then be the better guess.
-        let mut outcome = self.matched(predicted).or_else(|refusal| {
-            let other = self.pose * self.twist.over(seconds);
-            self.wheels
-                .map_or(Err(refusal), |_| self.matched(other).map_err(|_| refusal))
-        });
-        // A scan is as bent as the motion during it differs from the guess: bend it back by what was found, and look again.
-        if let Ok(found) = &outcome {
-            let found_motion = self.pose.between(self.placed(found).0);
-            if scan.duration() > 0.0 && differs(motion, found_motion) {
-                self.see(scan, found_motion, seconds);
-                outcome = self.matched(self.pose * found_motion);
+        let times = self.times(scan);
+        let rolling = self.rolling(wheels, times.seconds);
+        let before = self.motion.twist;
+        let expected = rolling.unwrap_or(before);
+        let motion = expected.over(times.seconds);
+        let predicted = (self.pose * motion, self.grown(motion));
+        self.see(scan, expected);
+        let mut outcome = self.matched(predicted.0);
+        if rolling.is_some() && score(&outcome) < UNSURE {
+            // Wheels that slip tell a wrong motion; to go on as before may then be the better guess.
+            let other = self.matched(self.pose * before.over(times.seconds));
+            if score(&other) > score(&outcome) {
+                outcome = other;
             }
         }
-        let before = self.pose;
-        match &outcome {
+        self.seen_from = predicted.0;
+        (self.pose, self.covariance) = match &mut outcome {
             Ok(found) => {
-                (self.pose, self.covariance) = self.placed(found);
                 self.refused_in_a_row = 0;
+                self.unbent(scan, found, expected, rolling, times)
             }
             Err(_) => {
-                (self.pose, self.covariance) = (predicted, predicted_covariance);
+                self.motion.advance(predicted.0, expected, rolling, times);
+                predicted
             }
-        }
-        if seconds > 0.0 && self.counters.scans > 0 {
-            self.twist = Twist::from_motion(before.between(self.pose), seconds);
-        }
-        let keyframe = self.wants_keyframe(&outcome);
+        };
+        let bend = math::abs(self.motion.twist.omega - before.omega) * times.duration;
+        let keyframe = self.wants_keyframe(&outcome, bend);
         if keyframe {
             self.keyframe.assign(self.points.as_slice());
-            self.keyframe_pose = self.pose;
+            self.keyframe_pose = self.seen_from;
             self.keyframe_covariance = self.covariance;
             self.counters.keyframes = self.counters.keyframes.wrapping_add(1);
         }
@@ -251,30 +252,61 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
-    /// Takes the scan's points, as if the robot had moved evenly by `motion` since the last scan.
-    fn see(&mut self, scan: &Scan<N>, motion: Pose, seconds: f32) {
+    /// Robot at the scan's end by a match of the scan as `expected` bent it back; where the robot moved otherwise, the
+    /// scan is bent back by that and matched once more.
+    fn unbent(
+        &mut self,
+        scan: &Scan<N>,
+        found: &mut Match,
+        expected: Twist,
+        rolling: Option<Twist>,
+        times: Times,
+    ) -> (Pose, Covariance) {
+        let back = -0.5 * times.duration;
+        let (end, mut covariance) = self.placed(found);
+        self.seen_from = end;
+        let mut middle = end * expected.over(back);
+        let during = self.motion.during(middle, rolling, times);
+        if differs(expected.over(times.duration), during.over(times.duration)) {
+            self.see(scan, during);
+            self.seen_from = middle * during.over(-back);
+            if let Ok(again) = self.matched(self.seen_from) {
+                *found = again;
+                (self.seen_from, covariance) = self.placed(found);
+                middle = self.seen_from * during.over(back);
+            }
+        }
+        let pose = middle * during.over(-back);
+        self.motion.advance(pose, during, rolling, times);
+        (pose, covariance)
+    }
+
+    /// Takes the scan's points, as if the robot had moved with `during` while it was taken.
+    fn see(&mut self, scan: &Scan<N>, during: Twist) {
         let config = PointsConfig {
             min_range: self.config.min_range,
             max_range: self.config.max_range,
             upside_down: self.config.mount.upside_down,
             enough: self.config.enough,
         };
-        let during = Twist::from_motion(motion, seconds);
         let twist = self.config.mount.lidar_twist(during);
         self.points.assign(scan, twist, &config);
     }
 
-    /// Time since the last scan's end (s); 0 for the first scan and for clocks that stand still or jump.
-    fn elapsed(&self, scan: &Scan<N>) -> f32 {
+    /// Times of a scan; all 0 for the first one and for clocks that stand still or jump.
+    fn times(&self, scan: &Scan<N>) -> Times {
         let micros = scan.end_us().wrapping_sub(self.end_us);
         if self.counters.scans == 0 || micros > 2_000_000 {
-            return 0.0;
+            return Times::default();
         }
-        micros as f32 * 1e-6
+        Times {
+            seconds: micros as f32 * 1e-6,
+            duration: if micros > 0 { scan.duration() } else { 0.0 },
+        }
     }
 
-    /// Motion of the robot since the last scan by its wheels, else by going on as before.
-    fn predicted_motion(&self, wheels: Option<Pose>, seconds: f32) -> Pose {
+    /// Velocity of the robot since the last scan by its wheels.
+    fn rolling(&self, wheels: Option<Pose>, seconds: f32) -> Option<Twist> {
         // No robot drives farther between two scans: a damaged message.
         const FARTHEST: f32 = 32.0;
         let motion = |(before, now): (Pose, Pose)| before.between(now);
@@ -282,7 +314,7 @@ impl<const N: usize> Odometry<N> {
             .zip(wheels)
             .map(motion)
             .filter(|motion| motion.is_finite() && motion.distance() < FARTHEST)
-            .unwrap_or_else(|| self.twist.over(seconds))
+            .map(|motion| Twist::from_motion(motion, seconds))
     }
 
     /// Covariance of the pose after a predicted motion.
@@ -343,8 +375,11 @@ impl<const N: usize> Odometry<N> {
         (pose, covariance)
     }
 
-    /// Whether the scan just placed is to be matched against from now on.
-    fn wants_keyframe(&mut self, outcome: &Result<Match, Refusal>) -> bool {
+    /// Whether the scan just placed is to be matched against from now on; `bend`: by how much more it turned in its
+    /// second half than in the scan before (rad).
+    fn wants_keyframe(&mut self, outcome: &Result<Match, Refusal>, bend: f32) -> bool {
+        /// A turn that changes by this much from scan to scan (rad) bends a scan more than it is noisy.
+        const BENT: f32 = 0.02;
         let enough = self.points.as_slice().len() >= 2 * usize::from(self.config.icp.min_inliers);
         match outcome {
             Err(Refusal::First) => enough,
@@ -361,17 +396,26 @@ impl<const N: usize> Odometry<N> {
             Ok(found) => {
                 let moved = self.keyframe_pose.between(self.pose);
                 let met = f32::from(found.overlap) / f32::from(found.beams.max(1));
+                let near = if bend > BENT { 0.5 } else { 1.0 };
                 enough
-                    && (moved.distance() > self.config.keyframe_distance
-                        || math::abs(moved.theta) > self.config.keyframe_turn
+                    && (near * moved.distance() > self.config.keyframe_distance
+                        || near * math::abs(moved.theta) > self.config.keyframe_turn
                         || met < self.config.keyframe_overlap)
             }
         }
     }
 }
 
-/// Whether two motions bend a scan differently: by more than 5 mm or 0.1°.
+/// A match that explains less than this share of the beams is tried again from another guess.
+const UNSURE: f32 = 0.6;
+
+/// How far a match may be trusted: 0 for none.
+fn score(outcome: &Result<Match, Refusal>) -> f32 {
+    outcome.as_ref().map_or(0.0, |found| found.score)
+}
+
+/// Whether two motions bend a scan differently: by more than 1 cm or 0.3°.
 fn differs(a: Pose, b: Pose) -> bool {
     let off = a.between(b);
-    off.distance() > 0.005 || math::abs(off.theta) > 0.002
+    off.distance() > 0.01 || math::abs(off.theta) > 0.005
 }

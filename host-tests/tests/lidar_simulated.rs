@@ -6,11 +6,14 @@ use std::process::Command;
 use beamfix::lidar::Model;
 use serde_json::Value;
 
-/// What the worst of them may be off after a minute (m, °). Their bar is 5 cm and 1°; those above are printed.
-const ALLOWED: (f64, f64) = (0.08, 2.0);
+/// What each of them may be off after a minute (m, °). Their bar is 5 cm and 1°; those above are marked.
+const ALLOWED: (f64, f64) = (0.06, 1.0);
 
 #[test]
-#[ignore = "five slow lidars (rplidar-express, ydlidar-g4, xv11, xv11-early, delta-2a) end more than 8 cm or 2 deg off"]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "a minute's drive for each of thirty sensors"
+)]
 fn every_lidar_finds_its_way() {
     let out = std::env::temp_dir().join(format!("beamfix-lidars-{}", std::process::id()));
     let mut too_far = Vec::new();
@@ -33,11 +36,7 @@ fn every_lidar_finds_its_way() {
         let report: Value = serde_json::from_slice(&run.stdout).expect("one JSON object");
         let number = |key: &str| report[key].as_f64().expect("number");
         let (metres, degrees) = (number("final_error_m"), number("final_error_deg"));
-        let mark = if metres > 0.05 || degrees > 1.0 {
-            "  above the bar"
-        } else {
-            ""
-        };
+        let mark = if metres > 0.05 { "  above the bar" } else { "" };
         println!(
             "{:<18} {:>5.1} cm {degrees:>6.2}°{mark}",
             model.name,
