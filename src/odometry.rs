@@ -25,7 +25,7 @@ pub struct OdometryConfig {
     /// Longest range that is used (m). Default 32.
     pub max_range: f32,
     /// Scans of more beams are thinned by averaging neighbours: see [`PointsConfig::enough`]. Default `u16::MAX`: every
-    /// beam counts. 240 halves the cost for an LD06, and half as many beams again drift half as much again.
+    /// beam counts. Fewer cost less and drift more.
     pub enough: u16,
     /// A new keyframe is made this far from the last one (m). Default 0.4: near enough for most surfaces to be seen by
     /// both, far enough for errors not to add up often.
@@ -208,10 +208,15 @@ impl<const N: usize> Odometry<N> {
     /// velocity goes on. A scan without a usable match leaves the guess as the pose, is counted, and says why.
     pub fn update(&mut self, scan: &Scan<N>, wheels: Option<Pose>) -> Step {
         let times = self.times(scan);
-        let rolling = self.rolling(wheels, times.seconds);
+        let rolled = self.rolled(wheels);
+        let rolling = rolled.map(|motion| Twist::from_motion(motion, times.seconds));
         let before = self.motion.twist;
         let expected = rolling.unwrap_or(before);
-        let motion = expected.over(times.seconds);
+        let motion = match rolled {
+            // Without a clock there is no velocity, but the wheels still tell how far.
+            Some(motion) if times.seconds == 0.0 => motion,
+            _ => expected.over(times.seconds),
+        };
         let predicted = (self.pose * motion, self.grown(motion));
         self.see(scan, expected);
         let mut outcome = self.matched(predicted.0);
@@ -305,8 +310,8 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
-    /// Velocity of the robot since the last scan by its wheels.
-    fn rolling(&self, wheels: Option<Pose>, seconds: f32) -> Option<Twist> {
+    /// Motion of the robot since the last scan by its wheels.
+    fn rolled(&self, wheels: Option<Pose>) -> Option<Pose> {
         // No robot drives farther between two scans: a damaged message.
         const FARTHEST: f32 = 32.0;
         let motion = |(before, now): (Pose, Pose)| before.between(now);
@@ -314,7 +319,6 @@ impl<const N: usize> Odometry<N> {
             .zip(wheels)
             .map(motion)
             .filter(|motion| motion.is_finite() && motion.distance() < FARTHEST)
-            .map(|motion| Twist::from_motion(motion, seconds))
     }
 
     /// Covariance of the pose after a predicted motion.
@@ -375,8 +379,8 @@ impl<const N: usize> Odometry<N> {
         (pose, covariance)
     }
 
-    /// Whether the scan just placed is to be matched against from now on; `bend`: by how much more it turned in its
-    /// second half than in the scan before (rad).
+    /// Whether the scan just placed is to be matched against from now on; `bend`: by how much more or less it turned
+    /// than the scan before (rad).
     fn wants_keyframe(&mut self, outcome: &Result<Match, Refusal>, bend: f32) -> bool {
         /// A turn that changes by this much from scan to scan (rad) bends a scan more than it is noisy.
         const BENT: f32 = 0.02;

@@ -86,6 +86,41 @@ fn the_drive_through_the_flat_ends_within_3_cm_and_half_a_degree() {
 }
 
 #[test]
+fn a_gap_between_scans_is_bridged_by_the_wheels() {
+    let run = run(1, 30.0);
+    let (turns, _) = capture::turns("ld06", &run.bytes).expect("an LD06");
+    let config = OdometryConfig {
+        mount: Mount {
+            robot_from_lidar: Settings::DEFAULT.mount.into(),
+            ..Mount::DEFAULT
+        },
+        ..OdometryConfig::DEFAULT
+    };
+    let mut pipeline = Pipeline::<456>::new(config);
+    let origin = run.moments[turns[0].ends_at - 1].truth;
+    let mut before = origin;
+    for (number, turn) in turns.iter().enumerate() {
+        // Longer than the two seconds after which the clock no longer tells a velocity.
+        if (150..180).contains(&number) {
+            continue;
+        }
+        let now = run.moments[turn.ends_at - 1];
+        let moved = score::error(Pose::IDENTITY, before.between(now.truth).into());
+        before = now.truth;
+        let step = pipeline.step(&turn.beams, Some(now.wheels.into()));
+        let (metres, degrees) = score::error(step.pose, origin.between(now.truth).into());
+        if number == 180 {
+            assert!(moved.0 > 0.5, "{moved:?} in the gap");
+        }
+        // The first scan after the gap is not bent back by any velocity: some centimetres.
+        assert!(
+            metres < 0.1 && degrees < 1.5,
+            "scan {number}: {metres} m, {degrees}°"
+        );
+    }
+}
+
+#[test]
 fn wheels_alone_are_much_worse() {
     // Otherwise the drive would test the wheels, not the matcher.
     let run = run(1, 120.0);

@@ -43,6 +43,10 @@ impl Motion {
     /// Velocity during a scan whose middle was found at `middle`: that of the wheels and of what they missed on the
     /// way from the last scan's middle. Without wheels they missed all of it.
     pub fn during(&self, middle: Pose, rolling: Option<Twist>, times: Times) -> Twist {
+        if times.seconds <= 0.0 {
+            // Over a gap of unknown length there is no velocity.
+            return Twist::ZERO;
+        }
         /// Less is the noise of two matches (m, rad): wheels know better.
         const SLIP: (f32, f32) = (0.01, 0.006);
         let between = times.seconds + 0.5 * (self.duration - times.duration);
