@@ -51,6 +51,8 @@ enum Line {
     Lidar,
     Telemetry,
     Commands,
+    /// Bytes that tell the motor's duty.
+    Motor,
     /// One UART for both: lidar in, frames out.
     LidarAndTelemetry,
 }
@@ -67,7 +69,7 @@ pub const BOARDS: &[Board] = &[
         ram_bytes: 4 << 20,
         icount_shift: 6,
         beams: BEAMS,
-        uarts: &[Line::Lidar, Line::Telemetry, Line::Commands],
+        uarts: &[Line::Lidar, Line::Telemetry, Line::Commands, Line::Motor],
     },
     Board {
         name: "m0",

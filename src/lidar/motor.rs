@@ -175,6 +175,9 @@ impl<P: SetDutyCycle> Motor<P> {
         }
         if math::abs(error) <= self.config.tolerance_rpm {
             self.state = MotorState::Steady;
+        } else if self.state == MotorState::Steady && 2.0 * rpm < self.config.target_rpm {
+            // Something holds it: it gets as much time as at its start.
+            (self.state, self.started_us) = (MotorState::SpinningUp, now_us);
         }
         self.drive(duty)
     }
@@ -286,6 +289,26 @@ mod tests {
         assert_eq!(stands, Err(MotorError::SpinUp { last_rpm: 0.0 }));
         let weak = run(MotorConfig::XV11, 200.0, 20).0;
         assert!(matches!(weak, Err(MotorError::SpinUp { last_rpm }) if last_rpm > 150.0));
+    }
+
+    #[test]
+    fn a_steady_motor_that_is_held_is_switched_off() {
+        let duty = Cell::new(0);
+        let mut motor = Motor::new(Pwm(&duty), MotorConfig::XV11);
+        motor.start(0).expect("no errors");
+        motor.report(20_000, 300.0).expect("no errors");
+        assert_eq!(motor.state(), MotorState::Steady);
+        let mut ended = None;
+        for now_us in (40_000..20_000_000).step_by(20_000) {
+            motor.report(now_us, 12.0).expect("no errors");
+            if let Err(error) = motor.poll(now_us) {
+                ended = Some((now_us, error));
+                break;
+            }
+        }
+        let error = MotorError::SpinUp { last_rpm: 12.0 };
+        assert_eq!(ended, Some((10_040_000, error)));
+        assert_eq!(duty.get(), 0);
     }
 
     #[test]

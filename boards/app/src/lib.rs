@@ -71,7 +71,8 @@ pub struct AppConfig {
     /// Whether every beam is sent on, for a picture on a PC. Default: no; a command switches it.
     pub scans: bool,
     /// How the lidar's motor is driven, where its PWM line is connected. Default: an LD06's, which listens to the line
-    /// only once it has seen a duty of 45 to 55 %. `None` keeps the line low: an LD06 then turns at 10 Hz by itself.
+    /// only once it has seen a duty of 45 to 55 %, and is at its speed well within 5 s. `None` keeps the line low: an
+    /// LD06 then turns at 10 Hz by itself.
     pub motor: Option<MotorConfig>,
 }
 
@@ -84,6 +85,7 @@ impl AppConfig {
         scans: false,
         motor: Some(MotorConfig {
             initial_duty: 0.5,
+            spin_up_ms: 5000,
             ..MotorConfig::LD06
         }),
     };

@@ -165,6 +165,7 @@ impl<P: SetDutyCycle> Supervisor<P> {
                 if now_us.wrapping_sub(self.motor_off_us) >= PAUSE_US {
                     self.restarts = self.restarts.saturating_add(1);
                     let _ = motor.start(now_us);
+                    return MotorState::SpinningUp;
                 }
                 MotorState::Off
             }

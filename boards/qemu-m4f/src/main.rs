@@ -1,16 +1,16 @@
-//! Lidar bytes in at UART 0, commands at UART 2, frames out at UART 1.
+//! Lidar bytes in at UART 0, commands at UART 2, frames out at UART 1, the motor's duty at UART 3.
 #![no_std]
 #![no_main]
 
 use beamfix_app::{
     AppConfig, Board, CONFIG,
     ring::Ring,
-    run::{Hardware, NoPwm, TICK_US, run},
+    run::{Hardware, TICK_US, run},
 };
 use beamfix_emulated::Machine as _;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::{entry, exception};
-use qemu_m4f::{clock::Timer, uart::Uart};
+use qemu_m4f::{clock::Timer, motor::Line, uart::Uart};
 
 static LIDAR: Ring<2048> = Ring::new();
 static COMMANDS: Ring<2048> = Ring::new();
@@ -52,9 +52,10 @@ fn main() -> ! {
     Uart::TELEMETRY.enable();
     Uart::LIDAR.enable();
     Uart::COMMANDS.enable();
+    Uart::MOTOR.enable();
     Timer.restart();
     wake_now_and_then();
-    run(APP, &HERE, (&LIDAR, &COMMANDS), &mut Mps2::default(), NoPwm)
+    run(APP, &HERE, (&LIDAR, &COMMANDS), &mut Mps2::default(), Line::LOW)
 }
 
 /// For the loop's look; the interrupt itself does nothing.

@@ -25,6 +25,8 @@ impl Uart {
     pub const TELEMETRY: Self = Self::at(0x4000_5000, 2);
     /// Where the commands come in.
     pub const COMMANDS: Self = Self::at(0x4000_6000, 4);
+    /// Where the motor's duty is told.
+    pub const MOTOR: Self = Self::at(0x4000_7000, 6);
 
     const fn at(base: usize, interrupt: i16) -> Self {
         Self {

@@ -30,6 +30,9 @@ pub struct Stream {
     /// The same socket as `lidar` on a board with one UART.
     telemetry: UnixStream,
     commands: Option<UnixStream>,
+    motor: Option<UnixStream>,
+    /// QEMU's own command line.
+    monitor: UnixStream,
     receiver: Receiver,
     running: Running,
     _folder: Folder,
@@ -58,8 +61,13 @@ impl Stream {
             command.arg(format!("socket,id=u{k},path={}", path.display()));
             command.args(["-serial", &format!("chardev:u{k}")]);
         }
+        let path = folder.0.join("monitor");
+        let monitor = UnixListener::bind(&path)?;
+        command.arg("-chardev");
+        command.arg(format!("socket,id=monitor,path={}", path.display()));
+        command.args(["-mon", "chardev=monitor"]);
         let mut running = Running::spawn(&mut command, board)?;
-        let (mut lidar, mut telemetry, mut commands) = (None, None, None);
+        let (mut lidar, mut telemetry, mut commands, mut motor) = (None, None, None, None);
         for (line, listener) in listeners {
             let socket = accept(&listener)
                 .with_context(|| format!("{}: {}", board.name, running.complaint()))?;
@@ -71,8 +79,10 @@ impl Stream {
                     telemetry = Some(socket);
                 }
                 Line::Commands => commands = Some(socket),
+                Line::Motor => motor = Some(socket),
             }
         }
+        let monitor = accept(&monitor).with_context(|| board.name)?;
         let (Some(lidar), Some(telemetry)) = (lidar, telemetry) else {
             bail!("{}: no UART for the lidar or for the frames", board.name);
         };
@@ -82,6 +92,8 @@ impl Stream {
             lidar,
             telemetry,
             commands,
+            motor,
+            monitor,
             receiver: Receiver::new(),
             running,
             _folder: folder,
@@ -103,6 +115,24 @@ impl Stream {
     /// The line for commands, where the board has one.
     pub fn commands(&mut self) -> Option<&mut UnixStream> {
         self.commands.as_mut()
+    }
+
+    /// What the board has done to the motor's line since this was last asked: its duties (%), in order.
+    pub fn duties(&mut self) -> Result<Vec<u8>> {
+        let mut duties = Vec::new();
+        if let Some(motor) = &mut self.motor {
+            motor.set_nonblocking(true)?;
+            match motor.read_to_end(&mut duties) {
+                Err(error) if error.kind() != ErrorKind::WouldBlock => return Err(error.into()),
+                _ => {}
+            }
+        }
+        Ok(duties)
+    }
+
+    /// Resets the board, as a supply that breaks down for a moment does; its memory keeps what it held.
+    pub fn reset(&mut self) -> Result<()> {
+        Ok(self.monitor.write_all(b"system_reset\n")?)
     }
 
     /// Reads what comes within this time, as it is: 0 bytes where nothing does.

@@ -1,0 +1,294 @@
+//! What goes wrong on a robot, on a whole emulated board: an unplugged lidar, a stalled motor, a supply that breaks down.
+//! Each time: what the board does, what its health says, and that poses go on afterwards.
+//!
+//! The board's clock is its own, so the lidar's bytes come at the lidar's speed, or slower where this computer is busy;
+//! no limit is on how long things take.
+
+use std::{
+    io::Write as _,
+    thread,
+    time::{Duration, Instant},
+};
+
+use beamfix::lidar::ld06::{FRAME, check_code};
+use beamfix_app::{
+    demo::Demo,
+    link::Receiver,
+    telemetry::{Health, LidarState, MotorState, Pose, Reset, Telemetry},
+};
+use host_tests::board::{BOARDS, recording::Recording, stream::Stream};
+
+/// Longest that anything may take; a tenth of it does on an idle machine.
+const PATIENCE: Duration = Duration::from_secs(90);
+/// Time between two packets (µs).
+const PACKET_US: u64 = 12 * 222;
+
+/// What the lidar does.
+#[derive(Clone, Copy, PartialEq)]
+enum Lidar {
+    /// It turns and sends.
+    Turns,
+    /// Its cable is pulled out.
+    Unplugged,
+    /// It has power, but something holds its motor: packets of one direction, the speed 0.
+    Held,
+}
+
+/// A board, the lidar that is connected to it, and what came from it.
+struct Robot {
+    board: Stream,
+    receiver: Receiver,
+    demo: Demo,
+    lidar: Lidar,
+    /// The lidar's clock now counts from here (ms): it starts over when it gets power again.
+    clock_ms: u64,
+    packets: u64,
+    due: Instant,
+    asked: Instant,
+    readies: Vec<Reset>,
+    poses: Vec<Pose>,
+    health: Option<Health>,
+    duties: Vec<u8>,
+}
+
+impl Robot {
+    fn new() -> Self {
+        let board = Stream::start(&BOARDS[0]).unwrap_or_else(|error| panic!("{error:#}"));
+        let now = Instant::now();
+        let mut robot = Self {
+            board,
+            receiver: Receiver::new(),
+            demo: Demo::new(),
+            lidar: Lidar::Unplugged,
+            clock_ms: 0,
+            packets: 0,
+            due: now,
+            asked: now,
+            readies: Vec::new(),
+            poses: Vec::new(),
+            health: None,
+            duties: Vec::new(),
+        };
+        robot.until("it listens", |robot| robot.readies.len() == 1);
+        robot
+    }
+
+    /// From now on.
+    fn lidar(&mut self, does: Lidar) {
+        if self.lidar == Lidar::Turns && does == Lidar::Unplugged {
+            // In the middle of a packet.
+            let half = self.packet();
+            self.send(&half[..FRAME / 2]);
+        }
+        if self.lidar == Lidar::Unplugged {
+            self.clock_ms = self.packets * PACKET_US / 1000;
+        }
+        self.lidar = does;
+        self.due = Instant::now();
+    }
+
+    /// The simulated lidar's next packet, by the clock of the one that is connected.
+    fn packet(&mut self) -> [u8; FRAME] {
+        let mut packet = self.demo.packet();
+        let ms = (self.packets * PACKET_US / 1000 - self.clock_ms) % 30_000;
+        self.packets += 1;
+        packet[44..46].copy_from_slice(&(ms as u16).to_le_bytes());
+        packet[46] = check_code(&packet[..46]);
+        packet
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        self.board
+            .send(bytes)
+            .unwrap_or_else(|error| panic!("{error:#}"));
+    }
+
+    /// Goes on until this is so, and gives the health asked for last.
+    fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) -> Option<Health> {
+        let start = Instant::now();
+        let mut bytes = [0; 4096];
+        while !is_so(self) {
+            let newest = self.poses.last();
+            assert!(
+                start.elapsed() < PATIENCE,
+                "not so for {PATIENCE:?}: {what}; {:?}, {newest:?}",
+                self.health
+            );
+            while self.lidar != Lidar::Unplugged && Instant::now() >= self.due {
+                let packet = match self.lidar {
+                    Lidar::Held => held(self.packet()),
+                    _ => self.packet(),
+                };
+                self.send(&packet);
+                self.due += Duration::from_micros(PACKET_US);
+            }
+            if self.asked.elapsed() > Duration::from_millis(100) {
+                self.asked = Instant::now();
+                let mut ask = Recording::new();
+                ask.ask_health();
+                let commands = self.board.commands().expect("it has a line for commands");
+                commands.write_all(ask.bytes()).expect("it takes commands");
+            }
+            let time = Duration::from_millis(5);
+            let n = self.board.read_for(&mut bytes, time);
+            let n = n.unwrap_or_else(|error| panic!("{error:#}"));
+            for &byte in &bytes[..n] {
+                match self.receiver.push(byte) {
+                    Some(Telemetry::Ready(ready)) => self.readies.push(ready.reset),
+                    Some(Telemetry::Pose(pose)) => self.poses.push(pose),
+                    Some(Telemetry::Health(health)) => self.health = Some(health),
+                    _ => {}
+                }
+            }
+            let duties = self.board.duties();
+            self.duties
+                .extend(duties.unwrap_or_else(|error| panic!("{error:#}")));
+            thread::yield_now();
+        }
+        println!(
+            "{what} after {:.1} s: {:?}",
+            start.elapsed().as_secs_f64(),
+            self.health
+        );
+        self.health
+    }
+
+    /// Goes on for so many more poses.
+    fn poses(&mut self, more: usize) {
+        let enough = self.poses.len() + more;
+        self.until("poses go on", |robot| robot.poses.len() >= enough);
+    }
+
+    fn until_health(&mut self, what: &str, is_so: impl Fn(&Health) -> bool) -> Health {
+        self.health = None;
+        let health = self.until(what, |robot| robot.health.as_ref().is_some_and(&is_so));
+        health.expect("it was there")
+    }
+
+    /// The last pose is where the robot is. Within 30 s of the lidar's start: then its clock wraps.
+    fn is_where_it_should_be(&mut self) {
+        let pose = self.poses.last().expect("a pose");
+        let since_start_us = u64::from(pose.time_us) % 30_000_000;
+        let truth = self
+            .demo
+            .truth((1000 * self.clock_ms + since_start_us) as u32);
+        let [x, y, theta] = pose.pose;
+        let off = truth.between(beamfix::geometry::Pose { x, y, theta });
+        let (mm, degrees) = (1000.0 * off.distance(), off.theta.to_degrees());
+        println!("{mm:.0} mm and {degrees:.2}° off");
+        assert!(
+            mm < 50.0 && degrees.abs() < 1.5,
+            "{pose:?}, really {truth:?}"
+        );
+    }
+
+    /// The numbers of all poses since the last start: none is missing.
+    fn is_without_gap(&self, from: usize) {
+        for (k, pose) in self.poses[from..].iter().enumerate() {
+            assert_eq!(usize::from(pose.sequence), k);
+        }
+    }
+}
+
+/// A packet while the motor stands: all beams in one direction, the speed 0.
+fn held(mut packet: [u8; FRAME]) -> [u8; FRAME] {
+    packet[2..4].fill(0);
+    packet[4..6].copy_from_slice(&9000u16.to_le_bytes());
+    packet[42..44].copy_from_slice(&9000u16.to_le_bytes());
+    packet[46] = check_code(&packet[..46]);
+    packet
+}
+
+/// A robot that has driven for two seconds, and knows where it is.
+fn driving() -> Robot {
+    let mut robot = Robot::new();
+    robot.lidar(Lidar::Turns);
+    // Where its first pose was is where it measures from.
+    robot.until("a first pose", |robot| !robot.poses.is_empty());
+    let first = robot.poses[0].time_us;
+    let _ = robot.demo.truth(first);
+    robot.poses(20);
+    let health = robot.until_health("all is well", |health| {
+        (health.lidar, health.motor) == (LidarState::Turning, MotorState::Steady)
+    });
+    assert_eq!(health.motor_restarts, 0);
+    robot.is_where_it_should_be();
+    robot
+}
+
+#[test]
+fn an_unplugged_lidar_is_told_and_poses_go_on_when_it_is_back() {
+    let mut robot = driving();
+    let before = robot.health.expect("asked for");
+    robot.lidar(Lidar::Unplugged);
+    robot.until_health("silent", |health| health.lidar == LidarState::Silent);
+    let seen = robot.poses.len();
+    // Its motor's line is switched off and on again, in case that helps.
+    robot.until_health("restarted", |health| health.motor_restarts >= 1);
+    assert_eq!(robot.poses.len(), seen, "poses without a lidar");
+    robot.lidar(Lidar::Turns);
+    robot.poses(30);
+    let after = robot.until_health("all is well", |health| {
+        (health.lidar, health.motor) == (LidarState::Turning, MotorState::Steady)
+    });
+    // Half a packet was lost, and nothing else.
+    assert!(after.check_errors <= before.check_errors + 1);
+    assert!(after.skipped_bytes - before.skipped_bytes < FRAME as u32);
+    assert_eq!((after.bytes_lost, robot.readies.len()), (0, 1));
+    robot.is_without_gap(0);
+    robot.is_where_it_should_be();
+}
+
+#[test]
+fn a_held_motor_is_told_switched_off_and_started_again() {
+    let mut robot = driving();
+    robot.duties.clear();
+    robot.lidar(Lidar::Held);
+    robot.until_health("it stands", |health| health.lidar == LidarState::Standing);
+    robot.until_health("off", |health| health.motor == MotorState::Off);
+    robot.until("its line is low", |robot| robot.duties.last() == Some(&0));
+    // More and more first, in vain.
+    let most = robot.duties.iter().max();
+    assert_eq!(most, Some(&100), "{:?}", robot.duties);
+    robot.duties.clear();
+    let health = robot.until_health("started again", |health| health.motor_restarts == 1);
+    assert_eq!(health.motor, MotorState::SpinningUp);
+    robot.until("its line shows it", |robot| {
+        // An LD06 listens to its line only once it has seen about half.
+        robot.duties.first() == Some(&50)
+    });
+    robot.lidar(Lidar::Turns);
+    robot.poses(30);
+    let health = robot.until_health("all is well", |health| {
+        (health.lidar, health.motor) == (LidarState::Turning, MotorState::Steady)
+    });
+    assert_eq!((health.motor_restarts, robot.readies.len()), (1, 1));
+    robot.is_without_gap(0);
+}
+
+#[test]
+fn a_board_whose_supply_breaks_down_starts_again_in_the_stream() {
+    let mut robot = driving();
+    let before = robot.health.expect("asked for");
+    assert!(before.packets > 0);
+    robot.duties.clear();
+    robot
+        .board
+        .reset()
+        .unwrap_or_else(|error| panic!("{error:#}"));
+    robot.until("it listens again", |robot| robot.readies.len() == 2);
+    let seen = robot.poses.len();
+    robot.poses(1);
+    // From the origin, and counted from 0.
+    let first = robot.poses[seen];
+    assert_eq!((first.sequence, first.pose), (0, [0.0; 3]));
+    robot.poses(30);
+    let after = robot.until_health("all is well", |health| {
+        (health.lidar, health.motor) == (LidarState::Turning, MotorState::Steady)
+    });
+    assert_eq!((after.motor_restarts, after.bytes_lost), (0, 0));
+    assert_eq!(robot.duties.first(), Some(&50));
+    assert_eq!(robot.readies.len(), 2);
+    robot.is_without_gap(seen);
+    println!("before: {before:?}");
+}
