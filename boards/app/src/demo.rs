@@ -155,9 +155,9 @@ impl Demo {
             math::round_to_i32(1000.0 * at.x),
             math::round_to_i32(1000.0 * at.y),
         );
-        let nearest = nearest((x, cos.into()), (y, sin.into()), &ALONG_Y).min(nearest(
-            (y, sin.into()),
-            (x, cos.into()),
+        let nearest = nearest((x, cos), (y, sin), &ALONG_Y).min(nearest(
+            (y, sin),
+            (x, cos),
             &ALONG_X,
         ));
         match u16::try_from(nearest + self.noise_mm()) {
@@ -174,7 +174,7 @@ impl Demo {
                 .random
                 .wrapping_mul(1_664_525)
                 .wrapping_add(1_013_904_223);
-            sum += (self.random >> 16) as i32 * (2 * NOISE_MM + 1) >> 16;
+            sum += ((self.random >> 16) as i32 * (2 * NOISE_MM + 1)) >> 16;
         }
         sum / 2 - 2 * NOISE_MM
     }

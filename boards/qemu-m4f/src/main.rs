@@ -55,7 +55,13 @@ fn main() -> ! {
     Uart::MOTOR.enable();
     Timer.restart();
     wake_now_and_then();
-    run(APP, &HERE, (&LIDAR, &COMMANDS), &mut Mps2::default(), Line::LOW)
+    run(
+        APP,
+        &HERE,
+        (&LIDAR, &COMMANDS),
+        &mut Mps2::default(),
+        Line::LOW,
+    )
 }
 
 /// For the loop's look; the interrupt itself does nothing.
