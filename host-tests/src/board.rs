@@ -62,7 +62,7 @@ pub const BOARDS: &[Board] = &[
     Board {
         name: "m4f",
         core: "Cortex-M4F",
-        firmware: Firmware::new("qemu-m4f", "thumbv7em-none-eabihf"),
+        firmware: Firmware::new("qemu-m4f", "thumbv7em-none-eabihf").proven(),
         emulator: "qemu-system-arm",
         machine: &["-M", "mps2-an386"],
         ram_start: 0x2000_0000,
@@ -74,7 +74,7 @@ pub const BOARDS: &[Board] = &[
     Board {
         name: "m0",
         core: "Cortex-M0",
-        firmware: Firmware::new("qemu-m0", "thumbv6m-none-eabi"),
+        firmware: Firmware::new("qemu-m0", "thumbv6m-none-eabi").proven(),
         emulator: "qemu-system-arm",
         machine: &["-M", "microbit"],
         ram_start: 0x2000_0000,
@@ -86,7 +86,7 @@ pub const BOARDS: &[Board] = &[
     Board {
         name: "rv32",
         core: "RV32IMC",
-        firmware: Firmware::new("qemu-rv32", "riscv32imc-unknown-none-elf"),
+        firmware: Firmware::new("qemu-rv32", "riscv32imc-unknown-none-elf").proven(),
         emulator: "qemu-system-riscv32",
         machine: &["-M", "virt", "-bios", "none"],
         ram_start: 0x8040_0000,
@@ -113,7 +113,9 @@ pub const STM32F4: Board = Board {
 
 /// The emulated Cortex-M4F that simulates its lidar itself.
 pub const DEMO: Board = Board {
-    firmware: Firmware::new("qemu-m4f", "thumbv7em-none-eabihf").with("demo"),
+    firmware: Firmware::new("qemu-m4f", "thumbv7em-none-eabihf")
+        .with("demo")
+        .proven(),
     ..BOARDS[0]
 };
 

@@ -155,11 +155,8 @@ impl Demo {
             math::round_to_i32(1000.0 * at.x),
             math::round_to_i32(1000.0 * at.y),
         );
-        let nearest = nearest((x, cos), (y, sin), &ALONG_Y).min(nearest(
-            (y, sin),
-            (x, cos),
-            &ALONG_X,
-        ));
+        let nearest =
+            nearest((x, cos), (y, sin), &ALONG_Y).min(nearest((y, sin), (x, cos), &ALONG_X));
         match u16::try_from(nearest + self.noise_mm()) {
             Ok(mm) if mm <= 12_000 => mm,
             _ => 0,

@@ -18,6 +18,8 @@ pub struct Firmware {
     pub package: &'static str,
     target: &'static str,
     feature: &'static str,
+    /// Whether the firmware is linked only if no panic can be reached.
+    is_proven: bool,
 }
 
 impl Firmware {
@@ -28,6 +30,7 @@ impl Firmware {
             package,
             target,
             feature: "",
+            is_proven: false,
         }
     }
 
@@ -35,6 +38,13 @@ impl Firmware {
     #[must_use]
     pub const fn with(self, feature: &'static str) -> Self {
         Self { feature, ..self }
+    }
+
+    /// The same, where its programs without semihosting link only if no panic can be reached.
+    #[must_use]
+    pub const fn proven(self) -> Self {
+        let is_proven = true;
+        Self { is_proven, ..self }
     }
 
     /// Builds one of its programs (`""`: the one of its name); gives a copy of the ELF file that nobody overwrites with
@@ -48,17 +58,16 @@ impl Firmware {
             "" => self.package,
             other => other,
         };
-        let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        let proof = match self.is_proven && (program == self.package || program == "maps") {
+            true => "prove-no-panic",
+            false => "",
+        };
+        let output = cargo()
             .args(["build", "--release", "--bin", program])
-            .args(["--features", self.feature])
+            .args(["--features", self.feature, "--features", proof])
             .arg("--target-dir")
             .arg(&target_dir)
             .current_dir(&folder)
-            // The board's own flags count, not those that this program was started with.
-            .env_remove("RUSTFLAGS")
-            .env_remove("CARGO_ENCODED_RUSTFLAGS")
-            .env_remove("CARGO_BUILD_TARGET")
-            .stdin(Stdio::null())
             .output()
             .with_context(|| format!("cargo could not be started in {}", folder.display()))?;
         if !output.status.success() {
@@ -86,16 +95,12 @@ impl Firmware {
     /// Builds its test of this name for the board; gives the ELF file.
     pub fn build_test(&self, test: &str) -> Result<PathBuf> {
         let folder = root().join("boards").join(self.package);
-        let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        let output = cargo()
             .args(["test", "--release", "--no-run", "--test", test])
             .args(["--message-format", "json"])
             .arg("--target-dir")
             .arg(root().join("target/boards"))
             .current_dir(&folder)
-            .env_remove("RUSTFLAGS")
-            .env_remove("CARGO_ENCODED_RUSTFLAGS")
-            .env_remove("CARGO_BUILD_TARGET")
-            .stdin(Stdio::null())
             .output()
             .with_context(|| format!("cargo could not be started in {}", folder.display()))?;
         let messages = String::from_utf8_lossy(&output.stdout);
@@ -112,4 +117,17 @@ impl Firmware {
             )
         })
     }
+}
+
+fn cargo() -> Command {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo
+        // The board's own flags count, not those that this program was started with.
+        .env_remove("RUSTFLAGS")
+        .env_remove("CARGO_ENCODED_RUSTFLAGS")
+        .env_remove("CARGO_BUILD_TARGET")
+        // For a debugger, and no emulator has one: half of what the builds leave on the disk. `./test boards` does the same.
+        .env("CARGO_PROFILE_RELEASE_DEBUG", "0")
+        .stdin(Stdio::null());
+    cargo
 }
