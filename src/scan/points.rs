@@ -8,6 +8,7 @@ use crate::{
 
 /// A place hit by a beam: 8 bytes, all integers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(align(4))]
 pub struct ScanPoint {
     /// Forward of the lidar (mm).
     pub x: i16,

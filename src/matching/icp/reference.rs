@@ -7,6 +7,7 @@ use crate::{matching::icp::lines, scan::ScanPoint};
 /// 12 bytes. The normal carries the line's weight: a residual computed with it is already divided by its own
 /// standard deviation, relative to that of a beam that hits head on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(align(4))]
 pub struct Line {
     /// Point on the line (mm); -32 768 stands for no line.
     pub qx: i16,
