@@ -34,11 +34,18 @@ pub(super) struct Best {
     pub ratio: f32,
 }
 
-/// A score at which the guess alone is believed, and one at which the starts next to it are.
+/// A score at which the guess alone is believed, one for what lies far from the guess, and one at which the starts
+/// next to the guess are.
 const SURE: f32 = 0.7;
+const SURER: f32 = 0.8;
 const LIKELY: f32 = 0.5;
+/// Far from the guess (m; a turn counted at 3 m).
+const FAR_OFF: f32 = 0.75;
 /// A second pose that is worth this share of the best makes the match ambiguous.
 const AMBIGUOUS: f32 = 0.95;
+/// Far from a guess that was called good the share is this times the score: the less a pose explains, the more may
+/// another one.
+const DOUBTFUL: f32 = 1.2;
 /// What a start loses per square metre between its end and the guess: a guess is worth something.
 const NEAR_PULL: f32 = 2.5;
 const FAR_PULL: f32 = 0.5;
@@ -119,9 +126,11 @@ pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<
         Ok(found) => race.enter(found, found.value),
         Err(error) => race.best = Err(error),
     }
+    let far = race.best.is_ok_and(|(best, _)| is_far(task, &best));
+    let sure = if far { SURER } else { SURE };
     match task.config.search {
         Search::Local => {
-            if race.is_below(SURE) {
+            if race.is_below(sure) {
                 around(task, &mut race, &NEAR);
             }
             if race.is_below(LIKELY) {
@@ -129,15 +138,20 @@ pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<
             }
         }
         Search::Global => {
-            if race.is_below(SURE) {
+            if race.is_below(sure) {
                 around(task, &mut race, &GLOBAL);
             }
         }
     }
     let (best, worth) = race.best?;
     let ratio = if worth > 0.0 { race.rival / worth } else { 1.0 };
-    // A guess that is worth something decides between two places; without one nothing does.
-    if ratio > AMBIGUOUS && task.config.search == Search::Global {
+    let most = match task.config.search {
+        Search::Global => AMBIGUOUS,
+        Search::Local if is_far(task, &best) => DOUBTFUL * best.value,
+        // A good guess decides between two places.
+        Search::Local => f32::INFINITY,
+    };
+    if ratio > most {
         return Err(MatchError::Ambiguous { ratio });
     }
     let (last, passes) = task.fine(best.at, observe)?;
@@ -148,6 +162,11 @@ pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<
         starts: race.starts,
         ratio,
     })
+}
+
+/// Whether a candidate lies where a good guess would not have led.
+fn is_far(task: &Task<'_>, found: &Candidate) -> bool {
+    found.at.distance(task.start) > FAR_OFF
 }
 
 /// Lets the starts of a ring compete.
