@@ -9,7 +9,7 @@ use beamfix::{
     geometry::Pose,
     scan::{Beam, Bearing, Range, Scan},
 };
-use beamfix_app::pairs::Pairs;
+use beamfix_app::pairs::Matcher;
 use semihosting::{
     fs::File,
     io::{self, Write as _},
@@ -18,21 +18,22 @@ use semihosting::{
 use crate::{INPUT, Machine, OUTPUT, read_full, stack::Stack};
 
 /// The memory that a bench needs.
-pub struct Bench<const N: usize> {
+pub struct Bench<const N: usize, M> {
     scan: Scan<N>,
-    pairs: Pairs<N>,
+    matcher: M,
 }
 
-impl<const N: usize> Bench<N> {
+impl<const N: usize, M> Bench<N, M> {
     /// Nothing read yet.
-    #[allow(clippy::new_without_default, reason = "for statics")]
-    pub const fn new() -> Self {
+    pub const fn new(matcher: M) -> Self {
         Self {
             scan: Scan::new(),
-            pairs: Pairs::new(),
+            matcher,
         }
     }
+}
 
+impl<const N: usize, M: Matcher<N>> Bench<N, M> {
     /// Matches all pairs of `input.bin`.
     pub fn run(&mut self, machine: &mut impl Machine, stack: &Stack) -> io::Result<()> {
         let mut input = File::open(INPUT)?;
@@ -44,15 +45,15 @@ impl<const N: usize> Bench<N> {
         while read_full(&mut input, &mut guess)? {
             self.read_scan(&mut input, beams)?;
             machine.restart();
-            self.pairs.set_reference(&self.scan);
+            self.matcher.set_reference(&self.scan);
             let reference = machine.instructions();
             self.read_scan(&mut input, beams)?;
             machine.restart();
-            self.pairs.set_current(&self.scan);
+            self.matcher.set_current(&self.scan);
             let prepare = reference + machine.instructions();
             let guess = pose_from(&guess);
             machine.restart();
-            let found = self.pairs.align(guess);
+            let found = self.matcher.align(guess);
             let matched = machine.instructions();
             let pose = found.map_or(guess, |found| found.pose);
             output.write_all(&u32::from(found.is_ok()).to_le_bytes())?;

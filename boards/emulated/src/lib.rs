@@ -13,6 +13,7 @@ pub mod maps;
 mod panic;
 pub mod replay;
 pub mod stack;
+pub mod stages;
 
 use semihosting::{fs::File, io, io::Read as _};
 

@@ -1,20 +1,122 @@
 //! Pairs of scans on an emulated board, or here: poses and instructions.
 
+use std::path::PathBuf;
+
 use anyhow::{Result, ensure};
 use beamfix::{
     geometry::Pose,
     scan::{Beam, Scan},
 };
-use beamfix_app::pairs::Pairs;
+use beamfix_app::pairs::{Matcher, Pairs, Staged};
+use serde::{Deserialize, Serialize};
 
 use super::{
     Board,
     emulator::{self, Count},
+    root,
 };
-use crate::readers::pairs;
+use crate::{
+    readers::pairs::{self, Pair},
+    sim::{Noise, Still, TruePose, scenes},
+};
+
+/// Every board with every matcher that has room on it.
+pub const ALL: [(&str, Which); 4] = [
+    ("m4f", Which::Fused),
+    ("m0", Which::Fused),
+    ("rv32", Which::Fused),
+    ("m4f", Which::Staged),
+];
 
 /// Most beams of a scan: what the smallest board has room for.
 pub const BEAMS: usize = 360;
+
+/// Which matcher.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Which {
+    /// The odometry's, in integers.
+    Fused,
+    /// The one whose stages are choices, each the default one.
+    Staged,
+}
+
+/// What a pair costs: medians over a list.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Figures {
+    /// The board.
+    pub board: String,
+    /// The matcher.
+    pub matcher: Which,
+    /// Instructions from the beams of both scans to a reference and points.
+    pub prepare: u32,
+    /// Instructions of the match.
+    pub matched: u32,
+    /// Instructions of the dearest match.
+    pub matched_max: u32,
+    /// Painted peak stack (bytes).
+    pub stack_bytes: u32,
+}
+
+impl Figures {
+    /// Of what [`on_board`] gave.
+    #[must_use]
+    pub fn new(board: &Board, matcher: Which, outcomes: &[Outcome], stack_bytes: u32) -> Self {
+        let sorted = |of: fn(&Outcome) -> u32| {
+            let mut values: Vec<u32> = outcomes.iter().map(of).collect();
+            values.sort_unstable();
+            values
+        };
+        let (prepare, matched) = (sorted(|o| o.prepare), sorted(|o| o.matched));
+        let middle = |values: &[u32]| values.get(values.len() / 2).copied().unwrap_or(0);
+        Self {
+            board: board.name.into(),
+            matcher,
+            prepare: middle(&prepare),
+            matched: middle(&matched),
+            matched_max: matched.last().copied().unwrap_or(0),
+            stack_bytes,
+        }
+    }
+}
+
+/// Where the figures over [`simulated`] pairs are kept.
+#[must_use]
+pub fn golden() -> PathBuf {
+    root().join("host-tests/golden/bench.json")
+}
+
+/// Forty pairs of 360 beams in furnished offices, each in one of its own; the guess off by up to 5 cm and 3 degrees.
+#[must_use]
+pub fn simulated() -> pairs::Pairs {
+    let still = Still::full_turn(BEAMS);
+    let mut list = pairs::Pairs::default();
+    for seed in 0..40 {
+        let world = scenes::office(seed);
+        let mut noise = Noise::new(seed, 1);
+        let place = scenes::office_place(&world, 0.6, &mut noise);
+        let mut draw = |most: f64| noise.even(-most, most);
+        let truth = TruePose::new(draw(0.1), draw(0.1), draw(0.1));
+        let guess = TruePose::new(
+            truth.x + draw(0.05),
+            truth.y + draw(0.05),
+            truth.theta + draw(0.05),
+        );
+        let reference = list.scans.len();
+        for at in [place, place.then(truth)] {
+            list.scans.push(still.scan(&world, at, &mut noise));
+        }
+        list.pairs.push(Pair {
+            id: seed as i64,
+            level: 1,
+            reference,
+            current: reference + 1,
+            guess: guess.into(),
+            truth: truth.into(),
+        });
+    }
+    list
+}
 
 /// What became of a pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,8 +132,17 @@ pub struct Outcome {
 }
 
 /// Matches all pairs on a board; gives the peak stack (bytes) too.
-pub fn on_board(board: &Board, list: &pairs::Pairs) -> Result<(Vec<Outcome>, u32)> {
-    let elf = board.build("bench")?;
+pub fn on_board(board: &Board, list: &pairs::Pairs, which: Which) -> Result<(Vec<Outcome>, u32)> {
+    let program = match which {
+        Which::Fused => "bench",
+        Which::Staged => "staged",
+    };
+    ensure!(
+        which == Which::Fused || board.name == "m4f",
+        "{}: only m4f has the room and the FPU for the staged matcher",
+        board.name
+    );
+    let elf = board.build(program)?;
     let output = emulator::run(board, &elf, &input(list)?, Count::Exact)?;
     let mut words = output
         .chunks_exact(4)
@@ -67,17 +178,23 @@ pub fn on_board(board: &Board, list: &pairs::Pairs) -> Result<(Vec<Outcome>, u32
 
 /// The same, here.
 #[must_use]
-pub fn on_host(list: &pairs::Pairs) -> Vec<Outcome> {
-    let mut pairs = Box::new(Pairs::<BEAMS>::new());
+pub fn on_host(list: &pairs::Pairs, which: Which) -> Vec<Outcome> {
+    match which {
+        Which::Fused => matched(&mut *Box::new(Pairs::<BEAMS>::new()), list),
+        Which::Staged => matched(&mut *Box::new(Staged::<BEAMS>::new()), list),
+    }
+}
+
+fn matched(matcher: &mut impl Matcher<BEAMS>, list: &pairs::Pairs) -> Vec<Outcome> {
     let mut scan = Box::new(Scan::<BEAMS>::new());
     list.pairs
         .iter()
         .map(|pair| {
             fill(&mut scan, &list.scans[pair.reference]);
-            pairs.set_reference(&scan);
+            matcher.set_reference(&scan);
             fill(&mut scan, &list.scans[pair.current]);
-            pairs.set_current(&scan);
-            let found = pairs.align(pair.guess);
+            matcher.set_current(&scan);
+            let found = matcher.align(pair.guess);
             Outcome {
                 pose: found.map_or(pair.guess, |found| found.pose),
                 found: found.is_ok(),

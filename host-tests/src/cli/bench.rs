@@ -1,13 +1,14 @@
 //! `bench`: pairs of scans on an emulated board, with the instructions that they take.
 
+use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context as _, Result, ensure};
 use host_tests::{
     board::{
         Board,
-        bench::{self, Outcome},
+        bench::{self, Figures, Outcome, Which},
     },
     hash::PoseHash,
     readers::pairs::{self, Pair},
@@ -22,10 +23,16 @@ use super::output;
 #[derive(clap::Args)]
 pub struct Args {
     /// m4f, m0 or rv32.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", default_value = "m4f")]
     board: String,
-    /// The pairs, in the binary format for boards.
-    file: PathBuf,
+    /// The pairs, in the binary format for boards; without it forty in simulated offices.
+    file: Option<PathBuf>,
+    /// The matcher whose stages are choices, each the default one, instead of the odometry's; on m4f.
+    #[arg(long)]
+    staged: bool,
+    /// Make the figures of the simulated pairs, on every board, the golden ones.
+    #[arg(long, conflicts_with_all = ["file", "staged", "board"])]
+    bless: bool,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -33,11 +40,25 @@ pub struct Args {
 
 /// Builds, runs, reports.
 pub fn run(args: &Args) -> Result<ExitCode> {
+    if args.bless {
+        return bless();
+    }
     let board = Board::named(&args.board)?;
-    let list = pairs::read_binary(&args.file)?;
-    ensure!(!list.pairs.is_empty(), "{}: no pairs", args.file.display());
-    let (outcomes, stack) = bench::on_board(board, &list)?;
-    let same = hash(&outcomes) == hash(&bench::on_host(&list));
+    let list = match &args.file {
+        Some(file) => {
+            let list = pairs::read_binary(file)?;
+            ensure!(!list.pairs.is_empty(), "{}: no pairs", file.display());
+            list
+        }
+        None => bench::simulated(),
+    };
+    let which = if args.staged {
+        Which::Staged
+    } else {
+        Which::Fused
+    };
+    let (outcomes, stack) = bench::on_board(board, &list, which)?;
+    let same = hash(&outcomes) == hash(&bench::on_host(&list, which));
 
     let prepare = sorted(outcomes.iter().map(|outcome| outcome.prepare));
     let matched = sorted(outcomes.iter().map(|outcome| outcome.matched));
@@ -92,6 +113,22 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     } else {
         ExitCode::FAILURE
     })
+}
+
+/// Measures the simulated pairs everywhere, and keeps the figures.
+fn bless() -> Result<ExitCode> {
+    let list = bench::simulated();
+    let mut figures = Vec::new();
+    for (name, which) in bench::ALL {
+        let board = Board::named(name)?;
+        let (outcomes, stack) = bench::on_board(board, &list, which)?;
+        figures.push(Figures::new(board, which, &outcomes, stack));
+    }
+    let text = serde_json::to_string_pretty(&figures)? + "\n";
+    let golden = bench::golden();
+    fs::write(&golden, &text).with_context(|| golden.display().to_string())?;
+    print!("{text}");
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Distance (mm) and turn (degrees) from the truth.

@@ -2,11 +2,12 @@
 #![no_std]
 #![no_main]
 
+use beamfix_app::pairs::Pairs;
 use beamfix_emulated::{bench::Bench, finish, stack::Stack};
 use qemu_m0::clock::Timer;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static mut BENCH: Bench<360> = Bench::new();
+    static mut BENCH: Bench<360, Pairs<360>> = Bench::new(Pairs::new());
     finish(BENCH.run(&mut Timer, &Stack::paint()))
 }

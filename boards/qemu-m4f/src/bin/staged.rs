@@ -1,0 +1,13 @@
+//! Pairs of scans, matched by the default choice of every stage and counted; see `beamfix_emulated::bench`.
+#![no_std]
+#![no_main]
+
+use beamfix_app::pairs::Staged;
+use beamfix_emulated::{bench::Bench, finish, stack::Stack};
+use qemu_m4f::clock::Timer;
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    static mut BENCH: Bench<360, Staged<360>> = Bench::new(Staged::new());
+    finish(BENCH.run(&mut Timer, &Stack::paint()))
+}
