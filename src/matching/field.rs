@@ -90,8 +90,16 @@ pub fn align<F: Field + ?Sized>(
     let sums = loop {
         let gate = if stride > 1 { gates.0 } else { gates.1 };
         let known = curved.as_ref().filter(|_| fine_passes % 3 != 0);
-        let sums = Sums::over(field, points, pose, usize::from(stride), gate, known)
-            .ok_or(MatchError::BadGuess)?;
+        let sums = Sums::over(
+            field,
+            points,
+            pose,
+            usize::from(stride),
+            gate,
+            config.weak_share,
+            known,
+        )
+        .ok_or(MatchError::BadGuess)?;
         if stride == 1 {
             curved = Some(sums);
         }
@@ -104,7 +112,7 @@ pub fn align<F: Field + ?Sized>(
             });
         }
         let step = sums.step(config).ok_or(MatchError::Degenerate)?;
-        pose = sums.moved(field.shape(), pose, step);
+        pose = Sums::moved(field.shape(), pose, step);
         let length = field.shape().resolution() * math::sqrt(step[0] * step[0] + step[1] * step[1]);
         let small = |factor: f32| {
             length <= factor * config.translation_tolerance
@@ -142,10 +150,18 @@ struct Sums {
     stride: u16,
     /// Cells in a lever.
     lever: f32,
-    /// Cell that levers count from.
-    pivot: (i32, i32),
-    /// Cells that make a turn comparable with a shift; eigenvalues and vectors of the curvature so scaled.
-    axes: (f32, [(f32, [f32; 3]); 3]),
+    axes: Axes,
+}
+
+/// The curvature, ready to be solved.
+#[derive(Debug, Clone, Copy, Default)]
+struct Axes {
+    /// Cells that make a turn comparable with a shift.
+    lever: f32,
+    /// The curvature so scaled.
+    scaled: Sym3,
+    /// Its eigenvalues and vectors, where some direction may be weak: 40 000 instructions on a core without an FPU.
+    pairs: Option<[(f32, [f32; 3]); 3]>,
 }
 
 impl Sums {
@@ -156,6 +172,7 @@ impl Sums {
         pose: Pose,
         stride: usize,
         gate: u8,
+        weak_share: f32,
         known: Option<&Self>,
     ) -> Option<Self> {
         let placement = Placement::new(field.shape(), pose)?;
@@ -166,28 +183,16 @@ impl Sums {
         while reach > (256u32 << lever_shift) as f32 {
             lever_shift += 1;
         }
-        let fine = (placement.shift - 6) & 31;
-        let inside = |place: u32, side: u16| {
-            let cell = (place as i32 >> placement.shift).max(0);
-            cell.min(i32::from(side) - 1)
-        };
-        let pivot = (
-            inside(placement.x, shape.width()),
-            inside(placement.y, shape.height()),
-        );
         let mut sums = Self {
             stride: stride as u16,
             lever: (1u32 << lever_shift) as f32,
-            pivot,
             ..Self::default()
         };
-        let unexplored = field.scale().unexplored;
-        let passes = Pass {
-            fine,
-            lever_shift: (lever_shift + 6) & 31,
-            pivot: ((pivot.0 << 6) as u32, (pivot.1 << 6) as u32),
+        let pass = Pass {
+            fine: (placement.shift - 6) & 31,
+            lever_shift: (lever_shift + placement.shift) & 31,
             gate: i32::from(gate),
-            unexplored: i32::from(unexplored),
+            unexplored: i32::from(field.scale().unexplored),
             // Half a 64th of a cell, so that cutting the rest off rounds.
             placement: Placement {
                 x: placement.x.wrapping_add(1 << ((placement.shift - 7) & 31)),
@@ -195,10 +200,11 @@ impl Sums {
                 ..placement
             },
         };
-        for chunk in points.chunks((16 * stride).max(1)) {
+        let most = if known.is_some() { SLOPES } else { CURVES };
+        for chunk in points.chunks((most * stride).max(1)) {
             let part = match known {
-                Some(_) => passes.sum::<F, false>(field, chunk, stride),
-                None => passes.sum::<F, true>(field, chunk, stride),
+                Some(_) => pass.sum::<F, false>(field, chunk, stride),
+                None => pass.sum::<F, true>(field, chunk, stride),
             };
             sums.add(&part);
         }
@@ -210,7 +216,13 @@ impl Sums {
             None => {
                 let curvature = sums.curvature();
                 let lever = sums.mean_lever(&curvature);
-                (lever, curvature.theta_scaled(1.0 / lever).eigen())
+                let scaled = curvature.theta_scaled(1.0 / lever);
+                let pairs = (!well_determined(&scaled, weak_share)).then(|| scaled.eigen());
+                Axes {
+                    lever,
+                    scaled,
+                    pairs,
+                }
             }
         };
         Some(sums)
@@ -257,25 +269,16 @@ impl Sums {
     fn step(&self, config: &FieldConfig) -> Option<[f32; 3]> {
         let [gx, gy, gt] = self.slope.map(|sum| sum as f32 / 64.0);
         let slope = [gx, gy, gt * self.lever];
-        let (lever, pairs) = self.axes;
-        let strongest = pairs[2].0;
-        if !(strongest > 0.0) {
-            return None;
-        }
-        // Along each axis of the curvature for itself: a weak one keeps the guess.
-        let b = [slope[0], slope[1], slope[2] / lever];
-        let mut step = [0.0f32; 3];
-        let mut any = false;
-        for (value, axis) in pairs {
-            if value < config.weak_share * strongest {
-                continue;
-            }
-            any = true;
-            let along = (axis[0] * b[0] + axis[1] * b[1] + axis[2] * b[2]) / value;
-            for k in 0..3 {
-                step[k] += along * axis[k];
-            }
-        }
+        let Axes {
+            lever,
+            scaled,
+            pairs,
+        } = self.axes;
+        let slope = [slope[0], slope[1], slope[2] / lever];
+        let mut step = match pairs {
+            None => scaled.solve(slope)?,
+            Some(pairs) => along_strong(&pairs, slope, config.weak_share)?,
+        };
         step[2] /= lever;
         // Half a metre and a third of a radian at most: the parabolas end long before.
         let length = math::sqrt(step[0] * step[0] + step[1] * step[1]);
@@ -286,7 +289,7 @@ impl Sums {
                 0.3 / math::max(math::abs(step[2]), 1e-6),
             ),
         );
-        any.then(|| step.map(|s| s * factor))
+        Some(step.map(|s| s * factor))
     }
 
     /// Cells that make a turn comparable with a shift.
@@ -299,16 +302,14 @@ impl Sums {
         }
     }
 
-    /// `pose` moved by a step along the grid's axes, which turns about the pivot.
-    fn moved(&self, shape: &Shape, pose_in_map: Pose, step: [f32; 3]) -> Pose {
-        let lidar = shape.to_cells(Point::new(pose_in_map.x, pose_in_map.y));
-        let (rx, ry) = (lidar.x - self.pivot.0 as f32, lidar.y - self.pivot.1 as f32);
+    /// `pose` moved by a step along the grid's axes, which turns about the lidar.
+    fn moved(shape: &Shape, pose_in_map: Pose, step: [f32; 3]) -> Pose {
         let axes = Pose {
             x: 0.0,
             y: 0.0,
             ..shape.origin()
         };
-        let shift = axes * Point::new(step[0] - step[2] * ry, step[1] + step[2] * rx);
+        let shift = axes * Point::new(step[0], step[1]);
         Pose::new(
             pose_in_map.x + shift.x * shape.resolution(),
             pose_in_map.y + shift.y * shape.resolution(),
@@ -360,12 +361,17 @@ impl Sums {
         let geometry = Covariance(geometry).rotated(field.shape().origin()).0;
         let information = geometry.scaled(1.0 / (sigma * sigma));
         let lever = math::max(self.mean_lever(&cells) * resolution, 1e-3);
-        let [(least, axis), _, (strongest, _)] = geometry.theta_scaled(1.0 / lever).eigen();
-        let weak = (least < config.weak_share * strongest).then(|| WeakDirection {
-            direction: axis,
-            lever,
-            sigma: sigma / math::sqrt(math::max(least, 1e-3)),
-        });
+        let scaled = geometry.theta_scaled(1.0 / lever);
+        let weak = if well_determined(&scaled, config.weak_share) {
+            None
+        } else {
+            let [(least, axis), _, (strongest, _)] = scaled.eigen();
+            (least < config.weak_share * strongest).then(|| WeakDirection {
+                direction: axis,
+                lever,
+                sigma: sigma / math::sqrt(math::max(least, 1e-3)),
+            })
+        };
         // Along a weak direction nothing is known: 1 m of doubt instead of a singular matrix.
         let floor = if weak.is_some() { 1.0 } else { 0.0 };
         let covariance =
@@ -389,6 +395,40 @@ impl Sums {
     }
 }
 
+/// Whether for certain no direction is weak: an eigenvalue is at least 4·det/tr², since the other two multiply to no
+/// more than tr²/4, and none is above tr.
+fn well_determined(m: &Sym3, weak_share: f32) -> bool {
+    let trace = m.xx + m.yy + m.tt;
+    let minor = m.xx * m.yy - m.xy * m.xy;
+    let determinant =
+        m.tt * minor - m.xx * m.yt * m.yt - m.yy * m.xt * m.xt + 2.0 * m.xy * m.xt * m.yt;
+    // All three positive, not two of them negative.
+    m.xx > 0.0 && minor > 0.0 && 4.0 * determinant > weak_share * trace * trace * trace
+}
+
+/// Newton step along each eigenvector for itself: a weak one keeps the guess. `None` where all are.
+fn along_strong(
+    pairs: &[(f32, [f32; 3]); 3],
+    slope: [f32; 3],
+    weak_share: f32,
+) -> Option<[f32; 3]> {
+    let strongest = pairs[2].0;
+    if !(strongest > 0.0) {
+        return None;
+    }
+    let mut step = [0.0f32; 3];
+    for (value, axis) in pairs {
+        if *value < weak_share * strongest {
+            continue;
+        }
+        let along = (axis[0] * slope[0] + axis[1] * slope[1] + axis[2] * slope[2]) / value;
+        for k in 0..3 {
+            step[k] += along * axis[k];
+        }
+    }
+    Some(step)
+}
+
 /// Byte from which on a beam counts, `distance` (m) from the nearest surface; above unexplored in any case.
 fn gate<F: Field + ?Sized>(field: &F, distance: f32) -> u8 {
     let scale = field.scale();
@@ -397,20 +437,23 @@ fn gate<F: Field + ?Sized>(field: &F, distance: f32) -> u8 {
     (byte.max(0) as u8).max(scale.unexplored.saturating_add(10))
 }
 
+/// Most beams whose sums fit in 32 bits: slopes have 16 bits and a sign, levers 8.
+const SLOPES: usize = 32;
+/// And with curvatures, of 10 bits and two levers.
+const CURVES: usize = 16;
+
 /// What does not change during a pass.
 struct Pass {
     placement: Placement,
     /// Right shift to 64ths of a cell.
     fine: u32,
-    /// And from there to levers.
+    /// And to levers.
     lever_shift: u32,
-    /// 64ths of a cell.
-    pivot: (u32, u32),
     gate: i32,
     unexplored: i32,
 }
 
-/// Sums over at most 16 beams, which fit in 32 bits: bytes' differences have 9 bits and a sign, levers 8.
+/// Sums over a few beams.
 #[derive(Default)]
 struct Part {
     slope: [i32; 3],
@@ -432,10 +475,12 @@ impl Pass {
         let mut part = Part::default();
         let [mut gx, mut gy, mut gt] = part.slope;
         let [mut sxx, mut sxy, mut syy, mut sxt, mut syt, mut stt] = part.curvature;
-        let (mut bytes, mut inliers, mut beside) = (0, 0, 0);
+        // Their number counts in the upper half, so that one register holds both.
+        let (mut bytes, mut beside) = (0u32, 0);
         for point in points.iter().step_by(stride.max(1)) {
-            let (px, py) = self.placement.place(point);
-            let (fx, fy) = (px >> self.fine, py >> self.fine);
+            let (rx, ry) = self.placement.turned(point);
+            let fx = self.placement.x.wrapping_add(rx as u32) >> self.fine;
+            let fy = self.placement.y.wrapping_add(ry as u32) >> self.fine;
             let Some(cells) = field.around(fx >> 6, fy >> 6) else {
                 continue;
             };
@@ -445,16 +490,14 @@ impl Pass {
                 }
                 continue;
             }
-            let (dx, dy) = ((fx & 63) as i32, (fy & 63) as i32);
-            let (bx, by) = (cells.here - cells.left, cells.here - cells.below);
-            let (ax, ay) = (cells.right - cells.here, cells.above - cells.here);
-            let (xx, yy) = (ax - bx, ay - by);
-            let xy = cells.corner - cells.above - ax;
-            // The slope half a cell before the middle, and from there on.
-            let slope_x = (bx << 6) + xx * dx + xy * (dy - 32);
-            let slope_y = (by << 6) + yy * dy + xy * (dx - 32);
-            let lx = (fx.wrapping_sub(self.pivot.0) as i32) >> self.lever_shift;
-            let ly = (fy.wrapping_sub(self.pivot.1) as i32) >> self.lever_shift;
+            let (dx, dy) = ((fx & 63) as i32 - 32, (fy & 63) as i32 - 32);
+            let xx = cells.right + cells.left - 2 * cells.here;
+            let yy = cells.above + cells.below - 2 * cells.here;
+            let xy = cells.corner + cells.here - cells.above - cells.right;
+            // The slope in the cell's middle, and from there on.
+            let slope_x = ((cells.right - cells.left) << 5) + xx * dx + xy * dy;
+            let slope_y = ((cells.above - cells.below) << 5) + yy * dy + xy * dx;
+            let (lx, ly) = (rx >> (self.lever_shift & 31), ry >> (self.lever_shift & 31));
             gx += slope_x;
             gy += slope_y;
             gt += slope_y * lx - slope_x * ly;
@@ -467,10 +510,10 @@ impl Pass {
                 syt += yt;
                 stt += yt * lx - xt * ly;
             }
-            bytes += cells.here as u32;
-            inliers += 1;
+            bytes += cells.here as u32 | 0x1_0000;
         }
-        (part.bytes, part.inliers, part.overlap) = (bytes, inliers, inliers + beside);
+        (part.bytes, part.inliers) = (bytes & 0xffff, bytes >> 16);
+        part.overlap = part.inliers + beside;
         part.slope = [gx, gy, gt];
         part.curvature = [sxx, sxy, syy, sxt, syt, stt];
         part

@@ -396,31 +396,33 @@ impl Field for LikelihoodField<&[u8]> {
 
     fn sum(&self, points: &[ScanPoint], placement: &Placement) -> u32 {
         let (cells, width) = (self.grid.cells(), self.grid.shape().width());
-        let mut sum = 0;
-        // So many that their sum and number fit in a word.
-        for points in points.chunks(2048) {
-            let (bytes, beams) = if placement.shift == Placement::COARSE {
-                table_sum::<{ Placement::COARSE }>(cells, width, points, placement)
-            } else {
-                table_sum::<{ Placement::FINE }>(cells, width, points, placement)
-            };
-            sum += bytes + (points.len() as u32 - beams) * u32::from(self.scale.unexplored);
-        }
-        sum
+        let (sum, missed) = if placement.shift == Placement::COARSE {
+            table_sum::<{ Placement::COARSE }>(cells, width, points, placement)
+        } else {
+            table_sum::<{ Placement::FINE }>(cells, width, points, placement)
+        };
+        sum.wrapping_add(missed * u32::from(self.scale.unexplored))
     }
 
     #[inline]
     fn around(&self, x: u32, y: u32) -> Option<Around> {
-        let width = usize::from(self.grid.shape().width());
+        // No table is narrower than this that has a cell inside its edge: said so that `width - 1` needs no check.
+        let width = usize::from(self.grid.shape().width()).max(2);
         if x.wrapping_sub(1) >= (width as u32).wrapping_sub(2) {
             return None;
         }
         let index = (y as usize).wrapping_mul(width).wrapping_add(x as usize);
-        // The rows below, of and above the cell: whether the corner is on the table says it for all six.
         let rows = self.grid.cells().get(index.wrapping_sub(width)..)?;
-        let &corner = rows.get(2 * width + 1)?;
-        let (&below, &left, &here) = (rows.first()?, rows.get(width - 1)?, rows.get(width)?);
-        let (&right, &above) = (rows.get(width + 1)?, rows.get(2 * width)?);
+        // From the cell below to the corner: this says it for all six.
+        if rows.len() < 2 * width + 2 {
+            return None;
+        }
+        let (lower, rows) = rows.split_at_checked(width - 1)?;
+        let (row, upper) = rows.split_at_checked(width + 1)?;
+        let (&[below, ..], &[left, here, right, ..], &[above, corner, ..]) = (lower, row, upper)
+        else {
+            return None;
+        };
         Some(Around {
             here: i32::from(here),
             left: i32::from(left),
@@ -432,7 +434,7 @@ impl Field for LikelihoodField<&[u8]> {
     }
 }
 
-/// Sum of the bytes in which points end, and how many end on the table.
+/// Sum of the bytes in which points end, and how many end off the table.
 #[inline(never)]
 fn table_sum<const SHIFT: u32>(
     cells: &[u8],
@@ -441,15 +443,15 @@ fn table_sum<const SHIFT: u32>(
     placement: &Placement,
 ) -> (u32, u32) {
     let (placement, width) = (*placement, u32::from(width));
-    let span = width << SHIFT;
-    // The number counts in the upper bits, so that one register holds both.
-    let mut sum = 0u32;
+    let (mut sum, mut missed) = (0u32, 0u32);
     let mut add = |point: &ScanPoint| {
         let (x, y) = placement.place(point);
+        let column = x >> SHIFT;
         // Rows and columns below 2¹⁵: the product cannot wrap, and a row off the table is off it.
-        let cell = (y >> SHIFT).wrapping_mul(width).wrapping_add(x >> SHIFT);
-        if let Some(&byte) = cells.get(cell as usize).filter(|_| x < span) {
-            sum = sum.wrapping_add(u32::from(byte)).wrapping_add(1 << 20);
+        let cell = (y >> SHIFT).wrapping_mul(width).wrapping_add(column);
+        match cells.get(cell as usize) {
+            Some(&byte) if column < width => sum = sum.wrapping_add(u32::from(byte)),
+            _ => missed += 1,
         }
     };
     let fours = points.chunks_exact(4);
@@ -457,5 +459,5 @@ fn table_sum<const SHIFT: u32>(
     for four in fours {
         four.iter().for_each(&mut add);
     }
-    (sum & 0xf_ffff, sum >> 20)
+    (sum, missed)
 }
