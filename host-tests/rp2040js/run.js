@@ -57,6 +57,14 @@ for (const uart of mcu.uart) {
   };
 }
 
+// An alarm that sets itself again for the very same moment, as 1.4.1's may by a rounding, would ring for ever.
+const link = clock.linkAlarm.bind(clock);
+clock.linkAlarm = (nanos, alarm) => link(Math.max(nanos, NS), alarm);
+// Nobody looks at the PWM's edges, three alarms in 33 µs.
+for (const channel of mcu.pwm.channels) {
+  for (const alarm of [channel.alarmA, channel.alarmB, channel.alarmBottom]) alarm.clockAlarm.schedule = () => {};
+}
+
 const elf = fs.readFileSync(elfFile);
 const [headers, count] = [elf.readUInt32LE(28), elf.readUInt16LE(44)];
 for (let k = 0; k < count; k++) {
@@ -99,6 +107,8 @@ function arrive() {
 }
 
 for (;;) {
+  // 1.4.1 falls asleep though an interrupt is pending, and sleeps through SysTick's; Arm's core does neither.
+  if (mcu.core.waiting && mcu.core.checkForInterrupts()) mcu.core.waiting = false;
   if (mcu.core.waiting) {
     // To the next thing that can happen, but not over it.
     const step = Math.max(NS, Math.min(clock.nanosToNextAlarm || 1e4, 1e4, sent < lidar.length ? nextNs - clock.nanos : 1e4));
