@@ -357,6 +357,6 @@ impl<'a, const N: usize> Localizer<'a, N> {
 
 /// Whether two poses are the same place: within `metres` and `radians`.
 pub(crate) fn alike(a: Pose, b: Pose, metres: f32, radians: f32) -> bool {
-    let off = a.between(b);
-    off.distance() <= metres && math::abs(off.theta) <= radians
+    let (x, y) = (b.x - a.x, b.y - a.y);
+    x * x + y * y <= metres * metres && math::abs(math::wrap_angle(b.theta - a.theta)) <= radians
 }

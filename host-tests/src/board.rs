@@ -6,9 +6,11 @@ pub mod drivers;
 pub mod emulator;
 pub mod fields;
 pub mod firmware;
+pub mod maps;
 pub mod real;
 pub mod recording;
 pub mod rp2040js;
+pub mod start;
 pub mod stream;
 
 use std::path::{Path, PathBuf};

@@ -13,7 +13,7 @@ use crate::{
     },
     math,
     scan::ScanPoint,
-    sensor_model::likelihood_field::Field,
+    sensor_model::likelihood_field::{Field, LikelihoodField},
 };
 
 /// Cells on a side of the squares that the map is searched in.
@@ -21,6 +21,8 @@ const SQUARE: i32 = 64;
 /// The pyramid's level whose blocks are tried, and their cells.
 const LEVEL: usize = 1;
 const BLOCK: i32 = 4;
+/// Blocks on a square's side.
+const SIDE: usize = (SQUARE / BLOCK) as usize;
 /// Beams that a block is tried with.
 const BEAMS: usize = 48;
 
@@ -33,6 +35,8 @@ pub(crate) struct Search<const N: usize> {
     /// What the robot moved since the scan.
     motion: Pose,
     stage: Stage,
+    /// Blocks of the square in which a lidar can stand: a word a row, a bit a column.
+    standing: [u16; SIDE],
     /// Blocks kept, to be looked at closely.
     blocks: Hypotheses,
     lookups: u64,
@@ -40,8 +44,8 @@ pub(crate) struct Search<const N: usize> {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
-    /// The next heading and square.
-    Blocks { heading: u16, square: u16 },
+    /// The next square and heading.
+    Blocks { square: u16, heading: u16 },
     /// The next block to be looked at closely.
     Closely { next: usize },
 }
@@ -54,6 +58,7 @@ impl<const N: usize> Search<N> {
             rotated: Rotated::new(),
             motion: Pose::IDENTITY,
             stage: Stage::Closely { next: MOST },
+            standing: [0; SIDE],
             blocks: Hypotheses::new(),
             lookups: 0,
         }
@@ -109,21 +114,25 @@ impl<const N: usize> Search<N> {
                 let rows = u16::div_ceil(shape.height(), SQUARE as u16);
                 let step = math::max(config.turn_step, 0.01);
                 let headings = math::round_to_i32(core::f32::consts::TAU / step).max(1);
-                self.square(
-                    pyramid,
-                    core::f32::consts::TAU * f32::from(heading) / headings as f32,
-                    i32::from(square % columns.max(1)) * SQUARE,
-                    i32::from(square / columns.max(1)) * SQUARE,
-                );
-                self.stage = if square + 1 < columns * rows {
+                let x = i32::from(square % columns.max(1)) * SQUARE;
+                let y = i32::from(square / columns.max(1)) * SQUARE;
+                if heading == 0 {
+                    self.floor(pyramid.field(), x, y);
+                }
+                let is_floor = self.standing != [0; SIDE];
+                if is_floor {
+                    let angle = core::f32::consts::TAU * f32::from(heading) / headings as f32;
+                    self.square(pyramid, angle, x, y);
+                }
+                self.stage = if is_floor && i32::from(heading) + 1 < headings {
                     Stage::Blocks {
-                        heading,
-                        square: square + 1,
-                    }
-                } else if i32::from(heading) + 1 < headings {
-                    Stage::Blocks {
+                        square,
                         heading: heading + 1,
-                        square: 0,
+                    }
+                } else if square + 1 < columns * rows {
+                    Stage::Blocks {
+                        square: square + 1,
+                        heading: 0,
                     }
                 } else {
                     Stage::Closely { next: 0 }
@@ -139,6 +148,22 @@ impl<const N: usize> Search<N> {
                 false
             }
         }
+    }
+
+    /// Where in a square a lidar can stand.
+    fn floor(&mut self, field: &LikelihoodField<&[u8]>, x: i32, y: i32) {
+        let floor = Floor::of(field);
+        for (row, word) in (0i32..).zip(&mut self.standing) {
+            *word = 0;
+            for column in 0..SIDE as i32 {
+                let (cx, cy) = (x + BLOCK * column, y + BLOCK * row);
+                let stands = [(1, 1), (3, 1), (1, 3), (3, 3)]
+                    .into_iter()
+                    .any(|(dx, dy)| floor.holds(field.byte((cx + dx) as u32, (cy + dy) as u32)));
+                *word |= u16::from(stands) << column;
+            }
+        }
+        self.lookups += 4 * (SIDE * SIDE) as u64;
     }
 
     /// Tries the blocks of a square with one heading.
@@ -161,17 +186,10 @@ impl<const N: usize> Search<N> {
             return;
         }
         let height = 1.0 / (255.0 * self.few.len() as f32);
-        for row in 0..SQUARE / BLOCK {
-            for quad in 0..SQUARE / BLOCK / 4 {
+        for (row, standing) in (0i32..).zip(self.standing) {
+            for quad in 0..SIDE as i32 / 4 {
                 let first = 4 * quad;
-                let standing = |column: i32| {
-                    let (cx, cy) = (x + BLOCK * (first + column), y + BLOCK * row);
-                    [(0, 0), (2, 0), (0, 2), (2, 2)]
-                        .into_iter()
-                        .any(|(dx, dy)| free(field, (cx + dx + 1) as u32, (cy + dy + 1) as u32))
-                };
-                let standing = [0, 1, 2, 3].map(standing);
-                self.lookups += 16;
+                let standing = [0, 1, 2, 3].map(|k| (standing >> (first + k)) & 1 == 1);
                 if standing == [false; 4] {
                     continue;
                 }
@@ -236,9 +254,22 @@ impl<const N: usize> Search<N> {
     }
 }
 
-/// Whether a lidar can stand there: explored, and not within 1.5σ of a surface.
-fn free<F: Field + ?Sized>(field: &F, x: u32, y: u32) -> bool {
-    let byte = field.byte(x, y);
-    let surface = 255 - math::round_to_i32(math::min(1.125 / field.scale().step, 200.0)) as u8;
-    byte != field.scale().unexplored && byte < surface
+/// Where a lidar can stand: what is explored, and not within 1.5σ of a surface.
+struct Floor {
+    surface: u8,
+    unexplored: u8,
+}
+
+impl Floor {
+    fn of<F: Field + ?Sized>(field: &F) -> Self {
+        let scale = field.scale();
+        Self {
+            surface: 255 - math::round_to_i32(math::min(1.125 / scale.step, 200.0)) as u8,
+            unexplored: scale.unexplored,
+        }
+    }
+
+    fn holds(&self, byte: u8) -> bool {
+        byte != self.unexplored && byte < self.surface
+    }
 }

@@ -14,6 +14,7 @@ mod panic;
 pub mod replay;
 pub mod stack;
 pub mod stages;
+pub mod start;
 
 use semihosting::{fs::File, io, io::Read as _};
 

@@ -13,7 +13,7 @@ use beamfix::{
         Field as _, FieldModel, LikelihoodField, Profile, stamp::Canvas as _, stored,
     },
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
     Board,
@@ -36,7 +36,7 @@ const NEWTON: FieldConfig = FieldConfig {
 };
 
 /// What the loops cost on a board.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Costs {
     /// As the command line has it.
     pub board: String,

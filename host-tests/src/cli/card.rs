@@ -7,14 +7,14 @@ use beamfix::lidar::Model;
 use host_tests::board::{
     BOARDS, Board,
     card::{self, Card},
-    drivers,
+    drivers, maps,
     real::{REAL, Real, RealCard},
 };
 
 use super::output;
 
 /// Flash, memory, stack and instructions of the firmware on the emulated boards, what that means for the real ones, and
-/// what each lidar's driver takes on the Cortex-M0.
+/// what each lidar's driver takes on the Cortex-M0 and what matching against maps takes.
 ///
 /// Instructions of a real board are those of its core as emulated, cycles a model; its flash and statics are its own.
 /// The tests compare them with `host-tests/golden/card.json`.
@@ -49,7 +49,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let models = if with_drivers { Model::ALL.len() } else { 0 };
     let bar = output::progress(boards.len() + real.len() + models, "boards");
     let mut cards = Vec::new();
-    for board in boards {
+    for board in &boards {
         cards.push(card::measure(board, &recording)?);
         bar.inc(1);
     }
@@ -63,14 +63,23 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         true => drivers::measure_all(|| bar.inc(1))?,
         false => Vec::new(),
     };
+    let maps = maps::measure(&boards)?;
     bar.finish_and_clear();
     if args.bless {
         card::bless(&cards, &real_cards)?;
+        maps.bless()?;
     }
     let mut value = serde_json::to_value(&cards)?;
     for row in value.as_array_mut().into_iter().flatten() {
         if row["board"] == "m0" {
             row["drivers"] = serde_json::to_value(&drivers)?;
+        }
+        let board = row["board"].clone();
+        for costs in maps.fields.iter().filter(|costs| board == costs.board) {
+            row["fields"] = serde_json::to_value(costs)?;
+        }
+        for costs in maps.starts.iter().filter(|costs| board == costs.board) {
+            row["start"] = serde_json::to_value(costs)?;
         }
     }
     if let (Some(rows), Some(more)) = (
@@ -83,13 +92,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let text = if args.json {
         json
     } else {
-        text(&cards, &real_cards, &drivers)
+        text(&cards, &real_cards, &drivers, &maps)
     };
     output::report(false, &value, &text)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn text(cards: &[Card], real: &[RealCard], drivers: &[drivers::Cost]) -> String {
+fn text(cards: &[Card], real: &[RealCard], drivers: &[drivers::Cost], maps: &maps::Card) -> String {
     let mut text = table(cards);
     if !real.is_empty() {
         text += "\n\n";
@@ -99,6 +108,8 @@ fn text(cards: &[Card], real: &[RealCard], drivers: &[drivers::Cost]) -> String 
         text += "\n\n";
         text += &drivers::table(drivers);
     }
+    text += "\n\n";
+    text += &maps.table();
     text
 }
 

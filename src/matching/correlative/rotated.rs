@@ -12,10 +12,13 @@ use crate::{
 pub(crate) struct Rotated<const N: usize> {
     /// Cell of each point.
     cells: heapless::Vec<(i16, i16), N>,
-    /// Their indices in one level's table, those first that stay on it in the whole window.
+    /// Their indices in one level's table: first those that stay on it in the whole window, then those that cross its
+    /// edge, then those that are off it all the time.
     indices: heapless::Vec<u32, N>,
     /// Points that stay on the table of the current level.
     inside: usize,
+    /// These and those that cross its edge.
+    near: usize,
     level: usize,
     /// Cells of the window.
     side: i16,
@@ -27,6 +30,7 @@ impl<const N: usize> Rotated<N> {
             cells: heapless::Vec::new(),
             indices: heapless::Vec::new(),
             inside: 0,
+            near: 0,
             level: usize::MAX,
             side: 0,
         }
@@ -70,13 +74,13 @@ impl<const N: usize> Rotated<N> {
         true
     }
 
-    /// Indices for a level; points that leave its table somewhere in the window go to the end.
+    /// Indices for a level, sorted by whether points stay on its table.
     fn index(&mut self, pyramid: &Pyramid<'_>, level: usize) {
         let table = pyramid.level(level);
         let shift = 2 * level as u32;
         let span = i32::from(self.side) >> shift;
         self.indices.clear();
-        self.inside = 0;
+        (self.inside, self.near) = (0, 0);
         self.level = level;
         for k in 0..self.cells.len() {
             let Some(&(x, y)) = self.cells.get(k) else {
@@ -94,13 +98,25 @@ impl<const N: usize> Rotated<N> {
             let _ = self
                 .indices
                 .push((row.wrapping_mul(table.width).wrapping_add(column)) as u32);
-            if on {
-                // Keep both lists in the same order.
-                swap(&mut self.indices, k, self.inside);
-                swap(&mut self.cells, k, self.inside);
-                self.inside += 1;
+            let off = column + span + 3 < 0
+                || row + span < 0
+                || column >= table.width
+                || row >= table.height;
+            if !off {
+                self.swap(k, self.near);
+                if on {
+                    self.swap(self.near, self.inside);
+                    self.inside += 1;
+                }
+                self.near += 1;
             }
         }
+    }
+
+    /// Swaps two points.
+    fn swap(&mut self, a: usize, b: usize) {
+        swap(&mut self.indices, a, b);
+        swap(&mut self.cells, a, b);
     }
 
     /// Sums of bytes at four places in a row: `x..x + 4` and `y` in blocks of the level, from the window's first.
@@ -119,17 +135,37 @@ impl<const N: usize> Rotated<N> {
         let mut sums = sum_four(table.cells.get(offset..).unwrap_or(&[]), inside);
         let shift = 2 * level as u32;
         let unexplored = u32::from(pyramid.field().scale().unexplored);
-        for &(cx, cy) in self.cells.iter().skip(self.inside) {
+        let (near, off) = self.cells.split_at_checked(self.near).unwrap_or((&[], &[]));
+        let mut missed = off.len() as u32;
+        for &(cx, cy) in near.iter().skip(self.inside) {
             let column = (i32::from(cx) >> shift) + table.before + i32::from(x);
             let row = (i32::from(cy) >> shift) + table.before + i32::from(y);
+            if !(0..table.height).contains(&row) {
+                missed += 1;
+                continue;
+            }
+            let start = row.wrapping_mul(table.width);
+            let four = table
+                .cells
+                .get(start.wrapping_add(column) as usize..)
+                .and_then(|rest| rest.first_chunk::<4>())
+                .filter(|_| column >= 0 && column + 3 < table.width);
+            if let Some(four) = four {
+                for (sum, &byte) in sums.iter_mut().zip(four) {
+                    *sum += u32::from(byte);
+                }
+                continue;
+            }
             for (sum, column) in sums.iter_mut().zip(column..) {
-                let on = (0..table.width).contains(&column) && (0..table.height).contains(&row);
-                let index = (row.wrapping_mul(table.width)).wrapping_add(column) as usize;
-                *sum += match table.cells.get(index) {
+                let on = (0..table.width).contains(&column);
+                *sum += match table.cells.get(start.wrapping_add(column) as usize) {
                     Some(&byte) if on => u32::from(byte),
                     _ => unexplored,
                 };
             }
+        }
+        for sum in &mut sums {
+            *sum += missed * unexplored;
         }
         sums
     }
