@@ -45,6 +45,7 @@ mod tests {
         let send = Command::Send {
             raw: true,
             scans: true,
+            quality: true,
         };
         assert!(link::append(&send, &mut ask) && link::append(&Command::Health, &mut ask));
         for &byte in &ask {

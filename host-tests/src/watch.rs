@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use beamfix::geometry::{Point, Pose};
 use beamfix_app::{
     link::{Counters, Receiver},
-    telemetry::{Health, Ready, Telemetry},
+    telemetry::{Health, Quality, Ready, Telemetry},
 };
 
 use crate::{
@@ -24,6 +24,7 @@ const POINTS: usize = 60_000;
 pub struct Watch<W> {
     receiver: Receiver,
     recorder: Option<Recorder<W>>,
+    qualities: Option<W>,
     /// Starts of the board.
     pub starts: u32,
     /// What it said at its start.
@@ -38,6 +39,12 @@ pub struct Watch<W> {
     pub hash: PoseHash,
     /// The last pose.
     pub pose: Option<beamfix_app::telemetry::Pose>,
+    /// How good its match was.
+    pub quality: Option<Quality>,
+    /// Matches that were told about in numbers.
+    pub qualities_seen: u32,
+    /// Of these, the ones with a direction that is hardly determined.
+    pub weak: u32,
     /// Bytes recorded.
     pub recorded: usize,
     /// The board's clock, unwrapped (µs).
@@ -51,8 +58,11 @@ pub struct Watch<W> {
 }
 
 impl<W: Write> Watch<W> {
-    /// Nothing so far; the lidar's bytes go into `recording`.
-    pub fn new(recording: Option<W>) -> io::Result<Self> {
+    /// Nothing so far; the lidar's bytes go into `recording`, how good each match was as lines of CSV into `qualities`.
+    pub fn new(recording: Option<W>, mut qualities: Option<W>) -> io::Result<Self> {
+        if let Some(qualities) = &mut qualities {
+            writeln!(qualities, "{QUALITY_COLUMNS}")?;
+        }
         let mut recorder = recording.map(Recorder::new).transpose()?;
         if let Some(recorder) = &mut recorder {
             recorder.push(0, Content::Lidar("ld06"))?;
@@ -60,6 +70,7 @@ impl<W: Write> Watch<W> {
         Ok(Self {
             receiver: Receiver::new(),
             recorder,
+            qualities,
             starts: 0,
             ready: None,
             health: None,
@@ -67,6 +78,9 @@ impl<W: Write> Watch<W> {
             missing: 0,
             hash: PoseHash::new(),
             pose: None,
+            quality: None,
+            qualities_seen: 0,
+            weak: 0,
             recorded: 0,
             clock_us: None,
             path: Vec::new(),
@@ -92,8 +106,11 @@ impl<W: Write> Watch<W> {
         self.receiver.counters()
     }
 
-    /// Ends the recording.
+    /// Ends the recording and the list.
     pub fn finish(&mut self) -> io::Result<()> {
+        if let Some(mut qualities) = self.qualities.take() {
+            qualities.flush()?;
+        }
         match self.recorder.take() {
             Some(recorder) => recorder.finish().map(drop),
             None => Ok(()),
@@ -120,6 +137,16 @@ impl<W: Write> Watch<W> {
                 self.pose = Some(pose);
             }
             Telemetry::Health(health) => self.health = Some(health),
+            Telemetry::Quality(quality) => {
+                self.qualities_seen += 1;
+                let found = quality.found.ok();
+                self.weak += u32::from(found.is_some_and(|found| found.weak.is_some()));
+                self.quality = Some(quality);
+                let pose = self.pose.filter(|pose| pose.sequence == quality.sequence);
+                if let (Some(file), Some(pose)) = (&mut self.qualities, pose) {
+                    writeln!(file, "{}", quality_line(&pose, &quality))?;
+                }
+            }
             Telemetry::Truth(truth) => {
                 self.truth
                     .push([truth.pose[0].into(), truth.pose[1].into()]);
@@ -193,8 +220,19 @@ impl<W: Write> Watch<W> {
                 health.lidar, health.bytes_lost, health.check_errors
             )
         });
+        let found = self.quality.and_then(|quality| quality.found.ok());
+        let quality = found.map_or_else(String::new, |found| {
+            let weak = found.weak.map_or_else(String::new, |weak| {
+                let [x, y, turn] = weak.direction;
+                format!(
+                    ", hardly determined along ({x:.2}, {y:.2}, {turn:.2}): {:.2} m",
+                    weak.sigma
+                )
+            });
+            format!(", score {:.2}{weak}", found.score)
+        });
         format!(
-            "{} poses ({} missing), {} frames damaged{pose}{health}",
+            "{} poses ({} missing), {} frames damaged{pose}{quality}{health}",
             self.poses, self.missing, counters.errors
         )
     }
@@ -220,4 +258,39 @@ impl<W: Write> Watch<W> {
             paths,
         }
     }
+}
+
+/// Columns of the list of qualities: `number_1`, `number_2` are what a refusal carries; what there is not is empty.
+pub const QUALITY_COLUMNS: &str = "sequence,time_us,x,y,theta,verdict,score,inliers,overlap,beams,residual,xx,xy,yy,xt,yt,tt,\
+    weak_x,weak_y,weak_turn,weak_sigma,iterations,starts,rival,number_1,number_2";
+
+fn quality_line(pose: &beamfix_app::telemetry::Pose, quality: &Quality) -> String {
+    let [x, y, theta] = pose.pose;
+    let start = format!(
+        "{},{},{x},{y},{theta},{:?}",
+        pose.sequence, pose.time_us, quality.verdict
+    );
+    let found = match &quality.found {
+        Ok(found) => found,
+        Err([one, two]) => return format!("{start},{}{one},{two}", ",".repeat(18)),
+    };
+    let [xx, xy, yy, xt, yt, tt] = found.covariance;
+    let weak = found.weak.map_or_else(
+        || ",,,".into(),
+        |weak| {
+            let [x, y, turn] = weak.direction;
+            format!("{x},{y},{turn},{}", weak.sigma)
+        },
+    );
+    format!(
+        "{start},{},{},{},{},{},{xx},{xy},{yy},{xt},{yt},{tt},{weak},{},{},{},,",
+        found.score,
+        found.inliers,
+        found.overlap,
+        found.beams,
+        found.residual,
+        found.iterations,
+        found.starts,
+        found.rival
+    )
 }

@@ -43,10 +43,49 @@ fn is_picture(path: &Path) {
     assert!(png.len() > 10_000, "{} bytes", png.len());
 }
 
+/// A line for each pose: in a flat nearly every match is good, and says so.
+fn are_qualities(file: &Path, poses: u64) {
+    let list = fs::read_to_string(file).expect("a list");
+    let mut lines = list
+        .lines()
+        .map(|line| line.split(',').collect::<Vec<&str>>());
+    let names = lines.next().expect("names of the columns");
+    let column = |name: &str| names.iter().position(|column| *column == name);
+    let [verdict, score, inliers, beams, xx, number] =
+        ["verdict", "score", "inliers", "beams", "xx", "number_1"]
+            .map(|name| column(name).expect(name));
+    let mut good = 0;
+    let mut count = 0;
+    for line in lines {
+        assert_eq!(line.len(), names.len(), "{line:?}");
+        count += 1;
+        let value = |at: usize| line[at].parse::<f64>();
+        match line[verdict] {
+            "Measured" | "Keyframe" => {
+                let (score, sigma) = (
+                    value(score).expect("a number"),
+                    value(xx).expect("a number").sqrt(),
+                );
+                let share = value(inliers).expect("a number") / value(beams).expect("a number");
+                assert!(
+                    (0.3..1.3).contains(&score) && (0.3..=1.0).contains(&share),
+                    "{line:?}"
+                );
+                assert!((1e-4..0.1).contains(&sigma), "{line:?}");
+                good += 1;
+            }
+            _ => assert!(value(score).is_err() && value(number).is_ok(), "{line:?}"),
+        }
+    }
+    assert_eq!(count, poses);
+    assert!(good * 10 > poses * 9, "{good} of {poses}");
+}
+
 #[test]
 fn a_board_is_drawn_and_its_recording_replays_to_the_same_bits() {
     let folder = folder("watch-board");
     let (picture, recording) = (folder.join("live.png"), folder.join("lidar.rec"));
+    let qualities = folder.join("quality.csv");
     let _ = fs::remove_file(&picture);
     let watched = json(&beamfix(&[
         "watch",
@@ -58,6 +97,8 @@ fn a_board_is_drawn_and_its_recording_replays_to_the_same_bits() {
         text(&picture),
         "--record",
         text(&recording),
+        "--quality",
+        text(&qualities),
         "--json",
     ]));
     println!("{watched}");
@@ -67,6 +108,7 @@ fn a_board_is_drawn_and_its_recording_replays_to_the_same_bits() {
         assert_eq!(watched[key], value, "{key}");
     }
     is_picture(&picture);
+    are_qualities(&qualities, poses);
     let replayed = json(&beamfix(&["replay", text(&recording), "--json"]));
     assert_eq!(replayed["scans"], watched["poses"]);
     assert_eq!(replayed["pose_hash"], watched["pose_hash"]);

@@ -37,6 +37,8 @@ pub enum Command<'a> {
         raw: bool,
         /// Every beam.
         scans: bool,
+        /// How good each match was.
+        quality: bool,
     },
 }
 

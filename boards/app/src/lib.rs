@@ -25,18 +25,17 @@ pub mod text;
 use beamfix::{
     geometry::Pose,
     lidar::{Packet as _, Protocol as _, ld06, motor::MotorConfig},
-    matching::MatchError,
-    odometry::{Odometry, OdometryConfig, Refusal, Step},
+    odometry::{Odometry, OdometryConfig, Step},
     scan::{Assembler, Beam},
 };
 use heapless::Vec;
 
 use command::Command;
 use supervisor::{Care, Seen};
-use telemetry::{Health, Piece, Raw, Ready, Reset, Telemetry, Verdict};
+use telemetry::{Health, Piece, Quality, Raw, Ready, Reset, Telemetry, Verdict};
 
 /// Version of [`telemetry`] and [`command`].
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;
 /// What the lidar sends at.
 pub const LIDAR_BAUD: u32 = 230_400;
 /// What frames leave at and commands come in at: a recording with everything switched on takes half of it.
@@ -70,6 +69,8 @@ pub struct AppConfig {
     pub record: bool,
     /// Whether every beam is sent on, for a picture on a PC. Default: no; a command switches it.
     pub scans: bool,
+    /// Whether every pose is followed by how good its match was, in numbers. Default: no; a command switches it.
+    pub quality: bool,
     /// How the lidar's motor is driven, where its PWM line is connected. Default: an LD06's, which listens to the line
     /// only once it has seen a duty of 45 to 55 %, and is at its speed well within 5 s. `None` keeps the line low: an
     /// LD06 then turns at 10 Hz by itself.
@@ -83,6 +84,7 @@ impl AppConfig {
         output: Output::Frames,
         record: false,
         scans: false,
+        quality: false,
         motor: Some(MotorConfig {
             initial_duty: 0.5,
             spin_up_ms: 5000,
@@ -118,7 +120,7 @@ pub enum Output {
 }
 
 /// Most bytes that one call gives.
-const OUT: usize = if cfg!(feature = "mavlink") { 448 } else { 192 };
+const OUT: usize = if cfg!(feature = "mavlink") { 448 } else { 256 };
 
 /// What a board runs. N is the most beams a revolution may have.
 pub struct App<const N: usize> {
@@ -148,6 +150,7 @@ struct Turns<const N: usize> {
     output: Output,
     record: bool,
     scans: bool,
+    quality: bool,
     now_us: u32,
     /// When the last pose was, until its error was told.
     #[cfg(feature = "demo")]
@@ -178,6 +181,7 @@ impl<const N: usize> App<N> {
                 output: config.output,
                 record: config.record,
                 scans: config.scans,
+                quality: config.quality,
                 now_us: 0,
                 #[cfg(feature = "demo")]
                 pose_us: None,
@@ -275,9 +279,14 @@ impl<const N: usize> App<N> {
                 }
                 self.turns.health_due = true;
             }
-            Some(Command::Send { raw, scans }) => {
+            Some(Command::Send {
+                raw,
+                scans,
+                quality,
+            }) => {
                 self.turns.record = raw;
                 self.turns.scans = scans;
+                self.turns.quality = quality;
             }
         }
         self.health_when_due()
@@ -383,6 +392,9 @@ impl<const N: usize> Turns<N> {
         self.sequence = self.sequence.wrapping_add(1);
         self.health_due |= self.sequence.is_multiple_of(HEALTH_EVERY);
         self.send(&Telemetry::Pose(pose));
+        if self.quality {
+            self.send_quality(pose.sequence, step);
+        }
         #[cfg(feature = "demo")]
         {
             self.pose_us = Some(time_us);
@@ -398,6 +410,11 @@ impl<const N: usize> Turns<N> {
     #[inline(never)]
     fn send_raw(&mut self, raw: &Raw) {
         self.send(&Telemetry::Raw(raw.clone()));
+    }
+
+    #[inline(never)]
+    fn send_quality(&mut self, sequence: u16, step: &Step) {
+        self.send(&Telemetry::Quality(Quality::of(sequence, step)));
     }
 
     #[inline(never)]
@@ -440,45 +457,18 @@ impl<const N: usize> Turns<N> {
 /// A step as it is sent.
 fn frame(sequence: u16, time_us: u32, step: &Step) -> telemetry::Pose {
     let c = step.covariance.0;
-    let (verdict, inliers, beams, residual) = match &step.outcome {
-        Ok(found) if step.keyframe => (
-            Verdict::Keyframe,
-            found.inliers,
-            found.beams,
-            found.residual,
-        ),
-        Ok(found) => (
-            Verdict::Measured,
-            found.inliers,
-            found.beams,
-            found.residual,
-        ),
-        Err(refusal) => (verdict(refusal), 0, 0, 0.0),
+    let (inliers, beams, residual) = match &step.outcome {
+        Ok(found) => (found.inliers, found.beams, found.residual),
+        Err(_) => (0, 0, 0.0),
     };
     telemetry::Pose {
         sequence,
         time_us,
         pose: [step.pose.x, step.pose.y, step.pose.theta],
         covariance: [c.xx, c.xy, c.yy, c.xt, c.yt, c.tt],
-        verdict,
+        verdict: Verdict::of(step),
         inliers,
         beams,
         residual,
-    }
-}
-
-fn verdict(refusal: &Refusal) -> Verdict {
-    match refusal {
-        Refusal::First => Verdict::First,
-        Refusal::TooFar { .. } => Verdict::TooFar,
-        Refusal::NoMatch(MatchError::TooFewBeams { .. }) => Verdict::TooFewBeams,
-        Refusal::NoMatch(MatchError::TooFewLines { .. }) => Verdict::TooFewLines,
-        Refusal::NoMatch(MatchError::TooFewCorrespondences { .. }) => {
-            Verdict::TooFewCorrespondences
-        }
-        Refusal::NoMatch(MatchError::Degenerate) => Verdict::Degenerate,
-        Refusal::NoMatch(MatchError::NotConverged { .. }) => Verdict::NotConverged,
-        Refusal::NoMatch(MatchError::Ambiguous { .. }) => Verdict::Ambiguous,
-        _ => Verdict::Refused,
     }
 }

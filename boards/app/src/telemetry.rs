@@ -2,6 +2,8 @@
 
 use beamfix::{
     lidar::{Packet as _, ld06},
+    matching::{Match, MatchError},
+    odometry::{Refusal, Step},
     scan::Bearing,
 };
 use heapless::Vec;
@@ -11,10 +13,12 @@ use serde::{Deserialize, Serialize};
 pub const POSE_FRAME: usize = 64;
 /// Most bytes of a framed [`Health`].
 pub const HEALTH_FRAME: usize = 56;
+/// Most bytes of a framed [`Quality`].
+pub const QUALITY_FRAME: usize = 80;
 /// Most bytes of a [`Raw`]: an LD06's packet.
 pub const RAW: usize = 47;
 
-/// A message from the board. How good a match was stands in its pose.
+/// A message from the board. Whether a match was good stands in its pose; how good, in all numbers, in its quality.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Telemetry {
     /// Sent once, when bytes are listened for.
@@ -31,6 +35,8 @@ pub enum Telemetry {
     Scan(Piece),
     /// Where the robot really is: only from a board that simulates its lidar.
     Truth(Truth),
+    /// How good the match behind the last pose was, where it is asked for.
+    Quality(Quality),
 }
 
 /// The firmware listens.
@@ -101,6 +107,128 @@ pub enum Verdict {
     TooFar,
     /// For a reason that this version does not name.
     Refused,
+}
+
+impl Verdict {
+    /// Of a step.
+    #[must_use]
+    pub fn of(step: &Step) -> Self {
+        match &step.outcome {
+            Ok(_) if step.keyframe => Self::Keyframe,
+            Ok(_) => Self::Measured,
+            Err(Refusal::First) => Self::First,
+            Err(Refusal::TooFar { .. }) => Self::TooFar,
+            Err(Refusal::NoMatch(error)) => match error {
+                MatchError::TooFewBeams { .. } => Self::TooFewBeams,
+                MatchError::TooFewLines { .. } => Self::TooFewLines,
+                MatchError::TooFewCorrespondences { .. } => Self::TooFewCorrespondences,
+                MatchError::Degenerate => Self::Degenerate,
+                MatchError::NotConverged { .. } => Self::NotConverged,
+                MatchError::Ambiguous { .. } => Self::Ambiguous,
+                _ => Self::Refused,
+            },
+            Err(_) => Self::Refused,
+        }
+    }
+}
+
+/// How good a match was.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Quality {
+    /// Of the pose that it belongs to.
+    pub sequence: u16,
+    /// What became of the match.
+    pub verdict: Verdict,
+    /// What was found, or the two numbers that say why nothing was.
+    pub found: Result<Found, [f32; 2]>,
+}
+
+/// What a match says about itself: see [`Match`], whose fields these are.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Found {
+    /// How well the pose explains the scan: 1 where every beam agrees, 0 where none does.
+    pub score: f32,
+    /// Beams that agree with the reference.
+    pub inliers: u16,
+    /// Beams that met a part of the reference that could have answered.
+    pub overlap: u16,
+    /// Beams given.
+    pub beams: u16,
+    /// Root mean square distance of the inliers from the reference's lines (m).
+    pub residual: f32,
+    /// Of this match alone, in the keyframe's frame: xx, xy, yy (m²), xθ, yθ (m·rad), θθ (rad²).
+    pub covariance: [f32; 6],
+    /// The direction that the scene hardly determines, if there is one.
+    pub weak: Option<Weak>,
+    /// Passes over the beams, of all starts.
+    pub iterations: u8,
+    /// Starts tried.
+    pub starts: u8,
+    /// What the best pose elsewhere is worth over what this one is: near 1 where two places look the same.
+    pub rival: f32,
+}
+
+/// A direction along which the pose is hardly measured, as along a corridor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Weak {
+    /// Unit vector over forward, left and heading · lever, in the keyframe's frame.
+    pub direction: [f32; 3],
+    /// Standard deviation along it by the scan alone (m).
+    pub sigma: f32,
+}
+
+impl Quality {
+    /// Of a step.
+    #[must_use]
+    pub fn of(sequence: u16, step: &Step) -> Self {
+        Self {
+            sequence,
+            verdict: Verdict::of(step),
+            found: match &step.outcome {
+                Ok(found) => Ok(Found::of(found)),
+                Err(refusal) => Err(numbers(refusal)),
+            },
+        }
+    }
+}
+
+impl Found {
+    fn of(found: &Match) -> Self {
+        let c = found.covariance.0;
+        Self {
+            score: found.score,
+            inliers: found.inliers,
+            overlap: found.overlap,
+            beams: found.beams,
+            residual: found.residual,
+            covariance: [c.xx, c.xy, c.yy, c.xt, c.yt, c.tt],
+            weak: found.weak.map(|weak| Weak {
+                direction: weak.direction,
+                sigma: weak.sigma,
+            }),
+            iterations: found.iterations,
+            starts: found.starts,
+            rival: found.rival,
+        }
+    }
+}
+
+/// Found and needed, m and rad, a score, a step, a ratio: what the refusal carries, 0 where it carries less.
+fn numbers(refusal: &Refusal) -> [f32; 2] {
+    match refusal {
+        Refusal::TooFar { distance, turn } => [*distance, *turn],
+        Refusal::NoMatch(
+            MatchError::TooFewBeams { found, needed }
+            | MatchError::TooFewLines { found, needed }
+            | MatchError::TooFewCorrespondences { found, needed },
+        ) => [f32::from(*found), f32::from(*needed)],
+        Refusal::NoMatch(
+            MatchError::Unlikely { score: one }
+            | MatchError::NotConverged { step: one }
+            | MatchError::Ambiguous { ratio: one },
+        ) => [*one, 0.0],
+        _ => [0.0; 2],
+    }
 }
 
 /// How the parts are.

@@ -50,7 +50,9 @@ pub fn append<const N: usize>(message: &Telemetry, out: &mut Vec<u8, N>) {
             let [x, y, theta] = truth.pose;
             Line(out).word("  really ").pose(x, y, theta)
         }
-        Telemetry::Cost(_) | Telemetry::Raw(_) | Telemetry::Scan(_) => return,
+        Telemetry::Cost(_) | Telemetry::Quality(_) | Telemetry::Raw(_) | Telemetry::Scan(_) => {
+            return;
+        }
     };
     if written.word("\r\n").is_cut() {
         out.truncate(start);

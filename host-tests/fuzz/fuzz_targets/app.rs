@@ -28,6 +28,7 @@ enum Piece {
     Send {
         raw: bool,
         scans: bool,
+        quality: bool,
     },
 }
 
@@ -87,8 +88,17 @@ fuzz_target!(|pieces: Vec<Piece>| {
                     assert!(link::append(&command, &mut commands));
                 }
             }
-            Piece::Send { raw, scans } => {
-                assert!(link::append(&Command::Send { raw, scans }, &mut commands));
+            Piece::Send {
+                raw,
+                scans,
+                quality,
+            } => {
+                let send = Command::Send {
+                    raw,
+                    scans,
+                    quality,
+                };
+                assert!(link::append(&send, &mut commands));
             }
             Piece::Health => assert!(link::append(&Command::Health, &mut commands)),
         }

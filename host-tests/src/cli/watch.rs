@@ -43,6 +43,9 @@ pub struct Args {
     /// Ask the board for the lidar's bytes and write them here.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// Ask the board how good each match was and write it here: a line of CSV for each.
+    #[arg(long, value_name = "FILE")]
+    quality: Option<PathBuf>,
     /// Stop after so many poses.
     #[arg(long, value_name = "N")]
     poses: Option<u32>,
@@ -63,9 +66,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bail!("--seconds {}: not a time", args.seconds);
     }
     let recording = args.record.as_deref().map(output::create).transpose()?;
+    let qualities = args.quality.as_deref().map(output::create).transpose()?;
     let mut live = Live {
         args,
-        watch: Watch::new(recording)?,
+        watch: Watch::new(recording, qualities)?,
         drawn: Instant::now(),
     };
     if let Some(folder) = args.out.parent() {
@@ -128,6 +132,7 @@ impl Live<'_> {
         asked.send(&Command::Send {
             raw: self.args.record.is_some(),
             scans: true,
+            quality: true,
         });
         asked.ask_health();
         let _ = commands.write_all(asked.bytes());
@@ -144,8 +149,11 @@ impl Live<'_> {
         if let Some(commands) = stream.commands() {
             self.ask(commands);
             self.until_health(&mut stream)?;
-        } else if self.args.record.is_some() {
-            bail!("--record: {} has no line for commands", board.name);
+        } else if self.args.record.is_some() || self.args.quality.is_some() {
+            bail!(
+                "--record, --quality: {} has no line for commands",
+                board.name
+            );
         }
         let mut lidar = stream.lidar()?;
         let feeder = thread::spawn(move || -> io::Result<()> {
@@ -243,7 +251,7 @@ impl Live<'_> {
         let value = json!({
             "poses": watch.poses, "missing": watch.missing, "starts": watch.starts,
             "frames": counters.frames, "damaged": counters.errors,
-            "recorded_bytes": watch.recorded, "pose_hash": watch.hash.to_string(),
+            "recorded_bytes": watch.recorded, "qualities": watch.qualities_seen, "weak": watch.weak, "pose_hash": watch.hash.to_string(),
             "bytes_lost": watch.health.map(|health| health.bytes_lost),
         });
         let text = format!("{}\n{}", watch.status(), self.args.out.display());

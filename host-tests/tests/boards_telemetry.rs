@@ -1,0 +1,197 @@
+//! Frames: how long they can get, and what they say about a match.
+
+use beamfix_app::{
+    AppConfig, BEAMS, CONFIG, link,
+    telemetry::{
+        Found, HEALTH_FRAME, Health, POSE_FRAME, Pose, QUALITY_FRAME, Quality, Reset, Telemetry,
+        Verdict, Weak,
+    },
+};
+use host_tests::encoder::{Echo, Encoder as _, ld06::Sensor};
+
+/// No zero byte in it.
+const WORST: f32 = f32::from_bits(0xbf9d_3f71);
+
+fn quality(found: Result<Found, [f32; 2]>) -> Quality {
+    Quality {
+        sequence: u16::MAX,
+        verdict: Verdict::TooFewCorrespondences,
+        found,
+    }
+}
+
+#[test]
+fn no_frame_is_longer_than_it_may_be() {
+    let pose = Pose {
+        sequence: u16::MAX,
+        time_us: u32::MAX,
+        pose: [WORST; 3],
+        covariance: [WORST; 6],
+        verdict: Verdict::TooFewCorrespondences,
+        inliers: u16::MAX,
+        beams: u16::MAX,
+        residual: WORST,
+    };
+    let health = Health {
+        packets: u32::MAX,
+        check_errors: u32::MAX,
+        skipped_bytes: u32::MAX,
+        beams_refused: u32::MAX,
+        matches_refused: u32::MAX,
+        commands: u32::MAX,
+        command_errors: u32::MAX,
+        bytes_lost: u32::MAX,
+        motor_restarts: u8::MAX,
+        ..Health::default()
+    };
+    let found = Found {
+        score: WORST,
+        inliers: u16::MAX,
+        overlap: u16::MAX,
+        beams: u16::MAX,
+        residual: WORST,
+        covariance: [WORST; 6],
+        weak: Some(Weak {
+            direction: [WORST; 3],
+            sigma: WORST,
+        }),
+        iterations: u8::MAX,
+        starts: u8::MAX,
+        rival: WORST,
+    };
+    for (message, most) in [
+        (Telemetry::Pose(pose), POSE_FRAME),
+        (Telemetry::Health(health), HEALTH_FRAME),
+        (Telemetry::Quality(quality(Ok(found))), QUALITY_FRAME),
+        (Telemetry::Quality(quality(Err([WORST; 2]))), QUALITY_FRAME),
+    ] {
+        let mut frame = heapless::Vec::<u8, 128>::new();
+        assert!(link::append(&message, &mut frame));
+        println!("{} bytes, at most {most}", frame.len());
+        assert!(frame.len() <= most, "{message:?}: {} bytes", frame.len());
+        let mut receiver = link::Receiver::new();
+        let mut back = frame.iter().filter_map(|&byte| receiver.push(byte));
+        assert_eq!(back.next(), Some(message));
+    }
+}
+
+/// What a board sends that is asked for everything, while its lidar stands and sees so far (mm) at a time (µs) in each direction (rad).
+fn sent(turns: u32, mm: impl Fn(f64, f64) -> Option<f64>) -> Vec<Telemetry> {
+    let mut bytes = Vec::new();
+    let mut sensor = Sensor::ld06();
+    while sensor.next_time_us() < f64::from(turns) * 1e5 {
+        let echo = |range_mm| Echo {
+            range_mm,
+            intensity: 200,
+        };
+        sensor.fire(&mut |time, bearing| mm(time, bearing).map(echo), &mut bytes);
+    }
+    let mut app = Box::new(beamfix_app::App::<BEAMS>::new(AppConfig {
+        record: true,
+        scans: true,
+        quality: true,
+        ..CONFIG
+    }));
+    let mut receiver = link::Receiver::new();
+    let mut messages = Vec::new();
+    let mut sent = app.ready(Reset::Other).to_vec();
+    for byte in bytes {
+        sent.extend_from_slice(app.lidar(byte));
+    }
+    messages.extend(sent.iter().filter_map(|&byte| receiver.push(byte)));
+    assert_eq!(receiver.counters().errors, 0);
+    messages
+}
+
+/// Each pose and the quality that must follow it.
+fn pairs(messages: &[Telemetry]) -> Vec<(Pose, Quality)> {
+    let poses = messages.iter().enumerate().filter_map(|(k, message)| {
+        let Telemetry::Pose(pose) = message else {
+            return None;
+        };
+        let Some(Telemetry::Quality(quality)) = messages.get(k + 1) else {
+            panic!("pose {} has no quality", pose.sequence);
+        };
+        assert_eq!(
+            (quality.sequence, quality.verdict),
+            (pose.sequence, pose.verdict)
+        );
+        Some((*pose, *quality))
+    });
+    poses.collect()
+}
+
+#[test]
+fn everything_that_is_asked_for_is_sent_and_nothing_is_cut() {
+    let messages = sent(20, |_, bearing| {
+        Some(3000.0 / libm::cos(bearing).abs().max(libm::sin(bearing).abs()))
+    });
+    let pairs = pairs(&messages);
+    assert!(pairs.len() >= 17, "{} poses", pairs.len());
+    for (k, (pose, quality)) in pairs.iter().enumerate() {
+        assert_eq!(usize::from(pose.sequence), k);
+        let Ok(found) = quality.found else {
+            assert_eq!((k, quality.verdict), (0, Verdict::First));
+            continue;
+        };
+        assert_eq!(
+            (found.inliers, found.beams, found.residual),
+            (pose.inliers, pose.beams, pose.residual)
+        );
+        assert!(found.score > 0.9 && found.overlap > 400, "{found:?}");
+        assert_eq!(found.weak, None, "a room is determined in all directions");
+    }
+    let count = |of: fn(&Telemetry) -> bool| messages.iter().filter(|message| of(message)).count();
+    let packets = 20 * 450 / 12;
+    let scans = count(|message| matches!(message, Telemetry::Scan(_)));
+    assert!((packets - 1..=packets).contains(&scans), "{scans} packets");
+    let raw: usize = messages
+        .iter()
+        .map(|message| match message {
+            Telemetry::Raw(raw) => raw.bytes.len(),
+            _ => 0,
+        })
+        .sum();
+    assert!(raw + 47 >= 47 * packets, "{raw} bytes");
+}
+
+#[test]
+fn a_corridor_says_along_what_it_is_weak() {
+    // Along x, 2 m wide; the lidar sees 12 m.
+    let messages = sent(20, |_, bearing| {
+        let mm = 1000.0 / libm::sin(bearing).abs();
+        (mm < 12_000.0).then_some(mm)
+    });
+    let mut weak = 0;
+    for (pose, quality) in pairs(&messages).iter().skip(1) {
+        let Ok(found) = quality.found else {
+            continue;
+        };
+        let direction = found.weak.expect("a corridor has one").direction;
+        assert!(direction[0].abs() > 0.98, "{direction:?}");
+        let [xx, _, yy, ..] = found.covariance;
+        assert!(xx > 100.0 * yy, "{pose:?}");
+        weak += 1;
+    }
+    assert!(weak >= 15, "{weak} matches");
+}
+
+#[test]
+fn a_refusal_says_its_numbers() {
+    // After half a second something covers all of the lidar but a crack.
+    let messages = sent(20, |time, bearing| {
+        (time < 5e5 || bearing.abs() < 0.05).then_some(2000.0 / libm::cos(bearing).abs().max(0.5))
+    });
+    let pairs = pairs(&messages);
+    let refused: Vec<_> = pairs
+        .iter()
+        .filter(|(pose, _)| pose.verdict == Verdict::TooFewBeams)
+        .collect();
+    assert!(refused.len() >= 12, "{pairs:?}");
+    for (_, quality) in refused {
+        let Err([found, needed]) = quality.found else {
+            panic!("{quality:?}");
+        };
+        assert!(found < needed && found > 0.0, "{found} of {needed}");
+    }
+}
