@@ -5,7 +5,11 @@ use crate::{
     linalg::{Covariance, Information, Sym3},
     matching::{
         Match, MatchError, WeakDirection,
-        icp::{Task, hypotheses::Best},
+        icp::{
+            FINE, Task,
+            hypotheses::Best,
+            pass::{FixedPose, Pass},
+        },
     },
     math,
 };
@@ -59,17 +63,22 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         let pretended = h.theta_scaled(1.0 / lever).quadratic(direction);
         let known = noise / (GUESS_SIGMA * GUESS_SIGMA);
         h = h.plus(&outer([x, y, t * lever]).scaled(known - pretended));
-        let moved = [
-            pose.x - guess.x,
-            pose.y - guess.y,
-            math::wrap_angle(pose.theta - guess.theta) * lever,
-        ];
-        let along = x * moved[0] + y * moved[1] + t * moved[2];
-        pose = Pose::new(
-            pose.x - along * x,
-            pose.y - along * y,
-            pose.theta - along * t / lever,
-        );
+        // The guess is kept along the direction ...
+        let kept = without(pose, guess, [x, y, t], lever);
+        // ... which is straight where the scene may be round: two passes lead back across it.
+        let all = Pass {
+            period: 1,
+            first: 0,
+            length: 1,
+            gate: FINE,
+        };
+        pose = kept;
+        for _ in 0..2 {
+            let across = FixedPose::new(pose).and_then(|at| task.step(at, all, None).ok());
+            pose = across.map_or(pose, |across| {
+                without(across.at.pose(), kept, [x, y, t], lever)
+            });
+        }
     }
     let alike = sums.correlation();
     let information = h.scaled(1.0 / noise);
@@ -95,6 +104,17 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         starts: best.starts,
         rival: best.ratio,
     })
+}
+
+/// `pose` without what it differs from `other` along a direction, headings as long as `lever`.
+fn without(pose: Pose, other: Pose, [x, y, t]: [f32; 3], lever: f32) -> Pose {
+    let turned = math::wrap_angle(pose.theta - other.theta) * lever;
+    let along = x * (pose.x - other.x) + y * (pose.y - other.y) + t * turned;
+    Pose::new(
+        pose.x - along * x,
+        pose.y - along * y,
+        pose.theta - along * t / lever,
+    )
 }
 
 /// The direction that is not determined, if there is one; refuses two.
