@@ -32,6 +32,10 @@ fn square_room(turns: u32) -> Vec<u8> {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn every_board_replays_the_same_bits() {
     let mut recording = Recording::new();
     recording.lidar(&square_room(30));
@@ -51,6 +55,10 @@ fn every_board_replays_the_same_bits() {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn every_board_streams_the_same_bits() {
     let bytes = square_room(30);
     for board in BOARDS {
@@ -60,6 +68,10 @@ fn every_board_streams_the_same_bits() {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn every_board_replays_a_real_log_to_the_same_bits() {
     let shared = std::env::var_os("BEAMFIX_SHARED").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"),

@@ -217,6 +217,10 @@ fn driving() -> Robot {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn an_unplugged_lidar_is_told_and_poses_go_on_when_it_is_back() {
     let mut robot = driving();
     let before = robot.health.expect("asked for");
@@ -240,6 +244,10 @@ fn an_unplugged_lidar_is_told_and_poses_go_on_when_it_is_back() {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn a_held_motor_is_told_switched_off_and_started_again() {
     let mut robot = driving();
     robot.duties.clear();
@@ -267,6 +275,10 @@ fn a_held_motor_is_told_switched_off_and_started_again() {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn a_board_whose_supply_breaks_down_starts_again_in_the_stream() {
     let mut robot = driving();
     let before = robot.health.expect("asked for");

@@ -5,7 +5,11 @@
 
 use beamfix_app::{BEAMS, demo::Demo, ring::Ring, telemetry::Telemetry};
 use host_tests::board::{
-    BOARDS, Board, Replay, STM32F4, difference, recording::Recording, rp2040js::Job, stream,
+    BOARDS, Board, Replay, STM32F4, difference,
+    firmware::Firmware,
+    recording::Recording,
+    rp2040js::{Job, PICO, PICO_EMBASSY},
+    stream,
 };
 
 /// Of the demo's robot, which drives in a circle as long as one likes.
@@ -53,6 +57,10 @@ fn run(board: &Board, bytes: &[u8], least: usize) {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn no_byte_is_lost_and_every_pose_is_out() {
     let bytes = ld06(5.0);
     for board in boards() {
@@ -61,6 +69,10 @@ fn no_byte_is_lost_and_every_pose_is_out() {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn a_damaged_line_resets_no_board() {
     // `compare` expects the one ready frame of the start, and then the same messages as here: a reset would send another.
     let bytes = damaged(&ld06(10.0));
@@ -95,17 +107,18 @@ fn three_minutes_on_a_damaged_line_on_every_board() {
     });
 }
 
-/// Bytes at their exact times into the Pico's firmware: nothing overruns while a match is computed.
-fn at_exact_times(seconds: f64) {
+/// Bytes at their exact times into a firmware of the Pico: nothing overruns while a match is computed.
+fn at_exact_times(firmware: Firmware, seconds: f64) {
     let bytes = ld06(seconds);
-    let Some(report) = Job::ld06(&bytes)
+    let Some(report) = Job::ld06(firmware, &bytes)
         .run()
         .unwrap_or_else(|error| panic!("{error:#}"))
     else {
         return;
     };
     println!(
-        "{} bytes in {:.1} s, {} overruns, {} poses, core awake {:.1} %",
+        "{}: {} bytes in {:.1} s, {} overruns, {} poses, core awake {:.1} %",
+        firmware.package,
         report.sent,
         report.seconds,
         report.overruns,
@@ -125,20 +138,37 @@ fn at_exact_times(seconds: f64) {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn a_pico_has_no_overrun_at_exact_byte_times() {
-    at_exact_times(5.0);
+    at_exact_times(PICO, 5.0);
 }
 
 #[test]
-#[ignore = "six minutes: cargo test --release --test boards_uart -- --ignored --nocapture"]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
+fn a_pico_with_embassy_has_no_overrun_at_exact_byte_times() {
+    at_exact_times(PICO_EMBASSY, 5.0);
+}
+
+#[test]
+#[ignore = "three minutes: cargo test --release --test boards_uart -- --ignored --nocapture"]
 fn a_pico_has_no_overrun_in_three_minutes_at_exact_byte_times() {
-    at_exact_times(180.0);
+    at_exact_times(PICO, 180.0);
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn a_pico_counts_and_survives_forced_overruns() {
     let bytes = ld06(8.0);
-    let mut job = Job::ld06(&bytes);
+    let mut job = Job::ld06(PICO, &bytes);
     // The UART holds 32 bytes: now and then 100 come at once, as if interrupts had been masked for 4 ms.
     job.bursts = (1..8).map(|second| (second * 17_625, 100)).collect();
     let Some(report) = job.run().unwrap_or_else(|error| panic!("{error:#}")) else {

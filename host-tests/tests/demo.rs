@@ -6,7 +6,11 @@ use std::{
 };
 
 use beamfix_app::{App, BEAMS, SMALL_BEAMS, demo::Demo};
-use host_tests::board::{BOARDS, DEMO, emulator, stream::Stream};
+use host_tests::board::{
+    BOARDS, DEMO, emulator,
+    rp2040js::{Job, PICO, PICO_EMBASSY},
+    stream::Stream,
+};
 
 /// The numbers that follow `word` and stand before `unit` in each line that has it.
 fn numbers(text: &str, word: &str, unit: &str) -> Vec<f64> {
@@ -40,6 +44,10 @@ fn on_host<const N: usize>() -> String {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn every_board_alone_follows_the_simulated_robot() {
     for board in BOARDS {
         let mut command = emulator::demo(board).unwrap_or_else(|error| panic!("{error:#}"));
@@ -70,7 +78,37 @@ fn every_board_alone_follows_the_simulated_robot() {
     }
 }
 
+/// So many lines tell an error, all of them small.
+fn follows(text: &str, least: usize) {
+    assert!(text.starts_with("beamfix listens"), "{text}");
+    let errors = numbers(text, "error", " mm");
+    println!("{} poses, last error {:?} mm", errors.len(), errors.last());
+    assert!(errors.len() >= least, "{text}");
+    assert!(errors.iter().all(|mm| *mm < 50.0), "{errors:?}");
+}
+
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
+fn both_firmwares_of_the_pico_run_the_demo() {
+    for firmware in [PICO, PICO_EMBASSY] {
+        let text = Job::alone(firmware.with("demo"), 4.0).run_text();
+        let Some(text) = text.unwrap_or_else(|error| panic!("{error:#}")) else {
+            return;
+        };
+        println!("{}:", firmware.package);
+        // At the lidar's own speed: ten a second.
+        follows(&text, 37);
+    }
+}
+
+#[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn the_firmware_itself_runs_the_demo_over_its_uart() {
     let mut stream = Stream::start(&DEMO).unwrap_or_else(|error| panic!("{error:#}"));
     let (mut text, mut bytes) = (Vec::new(), [0; 4096]);
@@ -84,9 +122,5 @@ fn the_firmware_itself_runs_the_demo_over_its_uart() {
         }
     }
     let text = String::from_utf8(text).expect("ASCII");
-    assert!(text.starts_with("beamfix listens"), "{text}");
-    let errors = numbers(&text, "error", " mm");
-    println!("{} poses, last error {:?} mm", errors.len(), errors.last());
-    assert!(errors.len() >= 60, "{text}");
-    assert!(errors.iter().all(|mm| *mm < 50.0), "{errors:?}");
+    follows(&text, 60);
 }

@@ -138,6 +138,10 @@ fn pymavlink_reads_poses_and_obstacles() {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn pymavlink_reads_what_the_emulated_board_sends() {
     let Some(python) = python() else { return };
     let mut stream = Stream::start(&MAVLINK).unwrap_or_else(|error| panic!("{error:#}"));

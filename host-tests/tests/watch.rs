@@ -82,6 +82,10 @@ fn are_qualities(file: &Path, poses: u64) {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
 fn a_board_is_drawn_and_its_recording_replays_to_the_same_bits() {
     let folder = folder("watch-board");
     let (picture, recording) = (folder.join("live.png"), folder.join("lidar.rec"));

@@ -9,6 +9,8 @@
 //! and these functions, and sleeps in between: [`run`] does that for every board with interrupts.
 #![no_std]
 
+#[cfg(feature = "demo")]
+pub mod checks;
 pub mod command;
 #[cfg(feature = "demo")]
 pub mod demo;

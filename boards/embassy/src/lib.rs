@@ -34,6 +34,8 @@ pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
     let _ = lines.telemetry.write_all(app.ready(reset)).await;
     defmt::info!("beamfix listens for an LD06 at {} baud", LIDAR_BAUD);
     let mut overruns = 0u32;
+    #[cfg(feature = "demo")]
+    let mut demo = beamfix_app::demo::Demo::new();
     loop {
         let now_us = now_us();
         app.set_time(now_us);
@@ -44,6 +46,8 @@ pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
                 feed();
             }
         }
+        #[cfg(feature = "demo")]
+        simulate(app, &mut demo, &mut lines.telemetry, now_us).await;
         let (mut lidar_bytes, mut command_bytes) = ([0; 64], [0; 64]);
         let read = select(
             lines.lidar.read(&mut lidar_bytes),
@@ -67,11 +71,41 @@ pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
             };
             if !sent.is_empty() {
                 let _ = lines.telemetry.write_all(sent).await;
-                let pose = app.pose();
-                defmt::info!("x {} m, y {} m, heading {} rad", pose.x, pose.y, pose.theta);
+                log(app);
             }
         }
     }
+}
+
+/// Lets the simulated lidar send what it has measured until now.
+#[cfg(feature = "demo")]
+async fn simulate<const N: usize>(
+    app: &mut App<N>,
+    demo: &mut beamfix_app::demo::Demo,
+    telemetry: &mut impl Write,
+    now_us: u32,
+) {
+    // A packet at a time.
+    let ring = beamfix_app::ring::Ring::<64>::new();
+    loop {
+        demo.advance(now_us, |byte| ring.push(byte));
+        if ring.is_empty() {
+            return;
+        }
+        while let Some(byte) = ring.pop() {
+            let sent = app.lidar(byte);
+            if !sent.is_empty() {
+                let _ = telemetry.write_all(sent).await;
+                let _ = telemetry.write_all(app.truth(demo)).await;
+                log(app);
+            }
+        }
+    }
+}
+
+fn log<const N: usize>(app: &App<N>) {
+    let pose = app.pose();
+    defmt::info!("x {} m, y {} m, heading {} rad", pose.x, pose.y, pose.theta);
 }
 
 /// Longest sleep: so often the supervisor looks.

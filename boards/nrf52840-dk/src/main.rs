@@ -5,7 +5,7 @@
 
 use core::convert::Infallible;
 
-use beamfix_app::{Board, CONFIG, telemetry::Reset};
+use beamfix_app::{AppConfig, Board, CONFIG, telemetry::Reset};
 use beamfix_embassy::{Lines, run};
 use defmt_rtt as _;
 use embassy_executor::Spawner;
@@ -32,7 +32,10 @@ bind_interrupts!(struct Interrupts {
     UARTE1 => InterruptHandler<UARTE1>;
 });
 
-static APP: ConstStaticCell<Board> = ConstStaticCell::new(Board::new(CONFIG));
+/// As this crate's features want it.
+const HERE: AppConfig = CONFIG.for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"));
+
+static APP: ConstStaticCell<Board> = ConstStaticCell::new(Board::new(HERE));
 /// What arrives while a match is computed: 178 ms of an LD06.
 static LIDAR: ConstStaticCell<[u8; 4096]> = ConstStaticCell::new([0; 4096]);
 static COMMANDS: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
@@ -106,7 +109,7 @@ async fn main(_spawner: Spawner) {
         telemetry,
     };
     let feed = || WatchdogHandle::pet(&mut watchdog);
-    run(APP.take(), &CONFIG, reset, lines, motor, feed).await
+    run(APP.take(), &HERE, reset, lines, motor, feed).await
 }
 
 /// Why the chip has started; forgets it, so that the next time tells itself.

@@ -3,7 +3,7 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::{Board, CONFIG, LIDAR_BAUD, TELEMETRY_BAUD, telemetry::Reset};
+use beamfix_app::{AppConfig, Board, CONFIG, LIDAR_BAUD, TELEMETRY_BAUD, telemetry::Reset};
 use beamfix_embassy::{Lines, run};
 use defmt_rtt as _;
 use embassy_executor::Spawner;
@@ -29,7 +29,10 @@ bind_interrupts!(struct Interrupts {
     UART1_IRQ => BufferedInterruptHandler<UART1>;
 });
 
-static APP: ConstStaticCell<Board> = ConstStaticCell::new(Board::new(CONFIG));
+/// As this crate's features want it.
+const HERE: AppConfig = CONFIG.for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"));
+
+static APP: ConstStaticCell<Board> = ConstStaticCell::new(Board::new(HERE));
 /// What arrives while a match is computed: 178 ms of an LD06.
 static LIDAR: ConstStaticCell<[u8; 4096]> = ConstStaticCell::new([0; 4096]);
 static COMMANDS: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
@@ -66,7 +69,7 @@ async fn main(_spawner: Spawner) {
         commands,
         telemetry,
     };
-    run(APP.take(), &CONFIG, reset, lines, motor, || {
+    run(APP.take(), &HERE, reset, lines, motor, || {
         watchdog.feed(PATIENCE)
     })
     .await

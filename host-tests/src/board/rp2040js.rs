@@ -1,8 +1,8 @@
-//! The Raspberry Pi Pico's firmware in rp2040js: cycles, and bytes at their exact times.
+//! The firmware of both boards with an RP2040 in rp2040js: cycles, bytes at their exact times, tests for the chip itself.
 
 use std::{
     fs,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::{Command, Stdio},
 };
 
@@ -11,12 +11,16 @@ use serde::{Deserialize, Serialize};
 
 use super::{Replay, emulator::Folder, firmware::Firmware, root};
 
-/// The firmware that runs.
+/// With rp2040-hal, by interrupts.
 pub const PICO: Firmware = Firmware::new("pico", "thumbv6m-none-eabi");
+/// With embassy-rp, by await.
+pub const PICO_EMBASSY: Firmware = Firmware::new("pico-embassy", "thumbv6m-none-eabi");
 
 /// What the lidar does.
 #[derive(Debug, Clone, Serialize)]
 pub struct Job {
+    #[serde(skip)]
+    firmware: Firmware,
     #[serde(skip)]
     bytes: Vec<u8>,
     lidar: PathBuf,
@@ -27,6 +31,8 @@ pub struct Job {
     pub pieces: Vec<(usize, u64)>,
     /// From which byte on how many bytes arrive in the very same moment.
     pub bursts: Vec<(usize, usize)>,
+    /// How long it goes on after the last byte (s).
+    pub rest: f64,
 }
 
 /// What became of it.
@@ -50,9 +56,10 @@ pub struct Report {
 impl Job {
     /// A lidar that sends these bytes, a packet each 12/4500 s, at its own speed.
     #[must_use]
-    pub fn ld06(bytes: &[u8]) -> Self {
+    pub fn ld06(firmware: Firmware, bytes: &[u8]) -> Self {
         let packets = bytes.len() / 47;
         Self {
+            firmware,
             bytes: bytes.to_vec(),
             lidar: PathBuf::new(),
             telemetry: PathBuf::new(),
@@ -61,17 +68,40 @@ impl Job {
                 .map(|packet| (47 * packet, packet as u64 * 12_000_000 / 4500))
                 .collect(),
             bursts: Vec::new(),
+            rest: 0.2,
+        }
+    }
+
+    /// No lidar for some time: what a firmware does by itself.
+    #[must_use]
+    pub fn alone(firmware: Firmware, seconds: f64) -> Self {
+        Self {
+            rest: seconds,
+            ..Self::ld06(firmware, &[])
         }
     }
 
     /// Runs it; `None`, after a line that says why, where node or rp2040js is missing.
-    pub fn run(mut self) -> Result<Option<Report>> {
-        let here = root().join("host-tests/rp2040js");
-        if !here.join("node_modules/rp2040js").exists() {
-            println!("left out: rp2040js is not there; `./test setup` installs it");
+    pub fn run(self) -> Result<Option<Report>> {
+        let Some((mut report, sent)) = self.execute()? else {
             return Ok(None);
-        }
-        let elf = PICO.build("")?;
+        };
+        report.replay = Replay::from_bytes(&sent)?;
+        Ok(Some(report))
+    }
+
+    /// The same for a firmware that sends lines.
+    pub fn run_text(self) -> Result<Option<String>> {
+        Ok(self
+            .execute()?
+            .map(|(_, sent)| String::from_utf8_lossy(&sent).into_owned()))
+    }
+
+    fn execute(mut self) -> Result<Option<(Report, Vec<u8>)>> {
+        let Some(here) = installed() else {
+            return Ok(None);
+        };
+        let elf = self.firmware.build("")?;
         let folder = Folder::new()?;
         self.lidar = folder.0.join("lidar.bin");
         self.telemetry = folder.0.join("telemetry.bin");
@@ -90,10 +120,34 @@ impl Job {
             "rp2040js: {}",
             String::from_utf8_lossy(&output.stderr)
         );
-        let mut report: Report = serde_json::from_slice(&output.stdout)?;
-        report.replay = Replay::from_bytes(&fs::read(&self.telemetry)?)?;
-        Ok(Some(report))
+        let report = serde_json::from_slice(&output.stdout)?;
+        Ok(Some((report, fs::read(&self.telemetry)?)))
     }
+}
+
+/// Runs one test of an ELF file made with embedded-test, as probe-rs does: by its address. Gives the exit status; `None`,
+/// after a line that says why, where node or rp2040js is missing.
+pub fn run_test(elf: &Path, address: u32) -> Result<Option<i32>> {
+    let Some(here) = installed() else {
+        return Ok(None);
+    };
+    let output = Command::new("node")
+        .arg(here.join("test.js"))
+        .arg(elf)
+        .arg(format!("run_addr {address}"))
+        .stdin(Stdio::null())
+        .output()
+        .context("node could not be started: `./test setup` installs it")?;
+    Ok(Some(output.status.code().unwrap_or(-1)))
+}
+
+fn installed() -> Option<PathBuf> {
+    let here = root().join("host-tests/rp2040js");
+    if here.join("node_modules/rp2040js").exists() {
+        return Some(here);
+    }
+    println!("left out: rp2040js is not there; `./test setup` installs it");
+    None
 }
 
 impl Report {
