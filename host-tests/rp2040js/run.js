@@ -7,7 +7,8 @@
 //   pieces     the piece from byte `at` on begins so long after the start, or when the line is free
 //   rest       goes on for so long (s) after the last byte
 //   bursts     so many bytes arrive in the very same moment, as if the core had been held up for so long
-// Prints one JSON object: sent, overruns (bytes that found the UART's FIFO full), seconds, cycles, sleeping.
+// Prints one JSON object: sent, overruns (bytes that found the UART's FIFO full), seconds, cycles, sleeping, reset (when the
+// watchdog bit, s, or null: it ends there), duties (of the motor's line: [s, %] at each change).
 const fs = require('fs');
 const { chip, NS } = require('./chip.js');
 
@@ -20,6 +21,17 @@ const START_NS = 1e9;
 const END_NS = 1e9 * job.rest;
 
 const { clock, mcu } = chip(elfFile);
+let resetNs = null;
+mcu.peripherals[0x40058].onWatchdogTrigger = () => (resetNs ??= clock.nanos);
+const duties = [];
+// The motor's line is GP6: slice 3, channel A.
+const slice = mcu.pwm.channels[3];
+const set = slice.writeRegister.bind(slice);
+slice.writeRegister = (offset, value) => {
+  set(offset, value);
+  const duty = Math.round((100 * (slice.cc & 0xffff)) / (slice.top + 1));
+  if (slice.top < 0xffff && duty !== duties.at(-1)?.[1]) duties.push([clock.nanos, duty]);
+};
 const telemetry = [];
 mcu.uart[0].onByte = (byte) => telemetry.push(byte);
 
@@ -65,6 +77,7 @@ for (;;) {
   }
   while (clock.nanos >= nextNs && sent < lidar.length) arrive();
   if (nextNs !== Infinity && sent === lidar.length && clock.nanos > lastNs + END_NS) break;
+  if (resetNs !== null) break;
   if (nextNs === Infinity && clock.nanos > START_NS) {
     console.error(`the firmware says nothing for ${START_NS / 1e9} s`);
     process.exit(1);
@@ -72,4 +85,15 @@ for (;;) {
 }
 fs.writeFileSync(job.telemetry, Buffer.from(telemetry));
 const seconds = (lastNs - startNs) / 1e9;
-console.log(JSON.stringify({ sent, overruns, seconds, cycles, sleeping: Math.round(sleeping), baud: uart.baudRate }));
+const since = (ns) => (ns - startNs) / 1e9;
+console.log(
+  JSON.stringify({
+    sent,
+    overruns,
+    seconds,
+    cycles,
+    sleeping: Math.round(sleeping),
+    reset: resetNs === null ? null : since(resetNs),
+    duties: duties.map(([ns, duty]) => [since(ns), duty]),
+  }),
+);

@@ -2,7 +2,8 @@
 //! Each time: what the board does, what its health says, and that poses go on afterwards.
 //!
 //! The board's clock is its own, so the lidar's bytes come at the lidar's speed, or slower where this computer is busy;
-//! no limit is on how long things take.
+//! no limit is on how long things take. What the watchdog does is tried with the Pico's own firmware in rp2040js, where time
+//! is simulated too.
 
 use std::{
     io::Write as _,
@@ -16,7 +17,12 @@ use beamfix_app::{
     link::Receiver,
     telemetry::{Health, LidarState, MotorState, Pose, Reset, Telemetry},
 };
-use host_tests::board::{BOARDS, recording::Recording, stream::Stream};
+use host_tests::board::{
+    BOARDS,
+    recording::Recording,
+    rp2040js::{Job, PICO, Report},
+    stream::Stream,
+};
 
 /// Longest that anything may take; a tenth of it does on an idle machine.
 const PATIENCE: Duration = Duration::from_secs(90);
@@ -303,4 +309,57 @@ fn a_board_whose_supply_breaks_down_starts_again_in_the_stream() {
     assert_eq!(robot.readies.len(), 2);
     robot.is_without_gap(seen);
     println!("before: {before:?}");
+}
+
+/// `None` where rp2040js is missing.
+fn in_rp2040js(job: Job) -> Option<Report> {
+    job.run().unwrap_or_else(|error| panic!("{error:#}"))
+}
+
+#[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
+fn bytes_that_lead_nowhere_end_in_a_reset_by_the_watchdog() {
+    // Another lidar's bytes, or a bad line, for 20 s.
+    let mut random = 1u32;
+    let noise: Vec<u8> = std::iter::repeat_with(|| {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (random >> 24) as u8
+    })
+    .take(20 * 23_040)
+    .collect();
+    let Some(report) = in_rp2040js(Job::ld06(PICO, &noise)) else {
+        return;
+    };
+    let reset = report.reset.expect("the watchdog bites");
+    println!("reset {reset:.2} s after the first byte");
+    // It gives up after 15 s, and the watchdog waits for 1 s.
+    assert!((15.5..16.5).contains(&reset), "{reset}");
+}
+
+#[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
+fn a_silent_lidar_resets_nothing_and_its_motor_is_tried_again_and_again() {
+    let Some(report) = in_rp2040js(Job::alone(PICO, 20.0)) else {
+        return;
+    };
+    println!("{:?}", report.duties);
+    assert_eq!(report.reset, None);
+    let duties: Vec<u8> = report.duties.iter().map(|(_, duty)| *duty).collect();
+    let changes = duties.iter().position(|duty| *duty == 50);
+    assert_eq!(
+        &duties[changes.expect("it is started")..],
+        [50, 0, 50, 0, 50, 0],
+        "5 s on, 2 s off"
+    );
+    let times: Vec<f64> = report.duties.iter().map(|(time, _)| *time).collect();
+    for (k, wanted) in [5.0, 7.0, 12.0, 14.0, 19.0].iter().enumerate() {
+        let time = times[times.len() - 5 + k];
+        assert!((time - wanted).abs() < 0.2, "{times:?}");
+    }
 }

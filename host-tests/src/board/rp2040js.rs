@@ -48,6 +48,10 @@ pub struct Report {
     pub cycles: u64,
     /// The others.
     pub sleeping: u64,
+    /// When the watchdog bit (s after the start), if it did: there it ended.
+    pub reset: Option<f64>,
+    /// What the motor's line was set to (%), and when (s after the start).
+    pub duties: Vec<(f64, u8)>,
     /// What the firmware has sent.
     #[serde(skip)]
     pub replay: Replay,

@@ -63,6 +63,8 @@ pub struct Args {
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum Mode {
     Odometry,
+    /// Refused with a clear line until it is there.
+    #[value(hide = true)]
     Slam,
     Localize,
 }
