@@ -120,7 +120,9 @@ impl Robot {
                 "not so for {PATIENCE:?}: {what}; {:?}, {newest:?}",
                 self.health
             );
-            while self.lidar != Lidar::Unplugged && Instant::now() >= self.due {
+            // One packet, then what the board has to say is read: a board whose line is full takes nothing more.
+            let is_due = Instant::now() >= self.due;
+            if self.lidar != Lidar::Unplugged && is_due {
                 let packet = match self.lidar {
                     Lidar::Held => held(self.packet()),
                     _ => self.packet(),
@@ -135,7 +137,7 @@ impl Robot {
                 let commands = self.board.commands().expect("it has a line for commands");
                 commands.write_all(ask.bytes()).expect("it takes commands");
             }
-            let time = Duration::from_millis(5);
+            let time = Duration::from_millis(if is_due { 1 } else { 5 });
             let n = self.board.read_for(&mut bytes, time);
             let n = n.unwrap_or_else(|error| panic!("{error:#}"));
             for &byte in &bytes[..n] {

@@ -48,6 +48,11 @@ impl<const B: usize> Ring<B> {
         self.with(|ring| ring.bytes.is_empty()).unwrap_or(true)
     }
 
+    /// Whether the next byte would be lost.
+    pub fn is_full(&self) -> bool {
+        self.with(|ring| ring.bytes.is_full()).unwrap_or(true)
+    }
+
     /// Bytes that found no room since the start; wrapping.
     pub fn lost(&self) -> u32 {
         self.with(|ring| ring.lost).unwrap_or(0)

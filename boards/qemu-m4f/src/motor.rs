@@ -27,9 +27,9 @@ impl SetDutyCycle for Line {
     }
 
     fn set_duty_cycle(&mut self, percent: u16) -> Result<(), Infallible> {
-        if self.percent != Some(percent) {
+        // Where nobody reads it, the line is full one day.
+        if self.percent != Some(percent) && Uart::MOTOR.try_send(percent as u8) {
             self.percent = Some(percent);
-            Uart::MOTOR.send(&[percent as u8]);
         }
         Ok(())
     }

@@ -40,9 +40,21 @@ impl Uart {
         // 25 MHz / 108 = 230 400 baud within 0.5 %.
         self.write(BAUD_DIV, 108);
         self.write(CTRL, CTRL_TX | CTRL_RX | CTRL_RX_INTERRUPT);
+        self.listen();
+    }
+
+    /// Lets its interrupt through.
+    pub fn listen(&self) {
         const ENABLE_INTERRUPTS: *mut u32 = core::ptr::without_provenance_mut(0xe000_e100);
         // SAFETY: the NVIC's register; 0 bits leave the others as they are. Nobody masks by priority.
         unsafe { ENABLE_INTERRUPTS.write_volatile(1 << self.interrupt) };
+    }
+
+    /// Keeps its interrupt waiting, and with it the bytes: until [`Uart::listen`].
+    pub fn pause(&self) {
+        const DISABLE_INTERRUPTS: *mut u32 = core::ptr::without_provenance_mut(0xe000_e180);
+        // SAFETY: as in `listen`.
+        unsafe { DISABLE_INTERRUPTS.write_volatile(1 << self.interrupt) };
     }
 
     /// The byte received, if `interrupt` is this UART's.
@@ -54,11 +66,19 @@ impl Uart {
         (self.read(STATE) & STATE_RX_FULL != 0).then(|| self.read(0) as u8)
     }
 
+    /// Sends a byte where the last one has left; `false` where it has not.
+    pub fn try_send(&self, byte: u8) -> bool {
+        let is_free = self.read(STATE) & STATE_TX_FULL == 0;
+        if is_free {
+            self.write(0, u32::from(byte));
+        }
+        is_free
+    }
+
     /// Sends bytes, waiting for each.
     pub fn send(&self, bytes: &[u8]) {
         for &byte in bytes {
-            while self.read(STATE) & STATE_TX_FULL != 0 {}
-            self.write(0, u32::from(byte));
+            while !self.try_send(byte) {}
         }
     }
 
