@@ -3,6 +3,7 @@
 use host_tests::board::{
     BOARDS,
     card::{Card, measure, recording},
+    real::{REAL, RealCard},
 };
 
 /// A rise by more than this fails: 2 %.
@@ -56,4 +57,44 @@ fn no_figure_rises() {
         "{}\nIf it must be: cargo run --release -- card --bless, with the reason in the commit's message",
         risen.join("\n")
     );
+}
+
+/// Flash and statics; what stands beside them in the table is reckoned from the cards above.
+#[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
+fn no_firmware_of_a_real_board_grows() {
+    let cores: Vec<Card> =
+        serde_json::from_str(include_str!("../golden/card.json")).expect("a list of cards");
+    let golden: Vec<RealCard> =
+        serde_json::from_str(include_str!("../golden/boards.json")).expect("a list of cards");
+    assert_eq!(golden.len(), REAL.len());
+    for (board, before) in REAL.iter().zip(&golden) {
+        let core = cores.iter().find(|card| card.board == board.emulated);
+        let now = board
+            .measure(core.expect("each core has a card"))
+            .unwrap_or_else(|error| panic!("{error:#}"));
+        println!("{now:?}");
+        assert_eq!(board.name, before.board);
+        for (what, before, now) in [
+            ("flash_bytes", before.flash_bytes, now.flash_bytes),
+            ("ram_bytes", before.ram_bytes, now.ram_bytes),
+        ] {
+            assert!(
+                now as f64 <= before as f64 * ALLOWED,
+                "{}: {what} was {before}, is {now}\nIf it must be: cargo run --release -- card --bless, with the reason \
+                 in the commit's message",
+                board.name
+            );
+        }
+        // The rest follows from these and the core's figures.
+        assert_eq!(
+            (now.share_percent, now.longest_ms, now.verdict),
+            (before.share_percent, before.longest_ms, before.verdict),
+            "{}: cargo run --release -- card --bless",
+            board.name
+        );
+    }
 }
