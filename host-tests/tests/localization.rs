@@ -97,18 +97,18 @@ fn find(
     End::Open
 }
 
-#[test]
-fn starts_without_a_pose() {
-    let place = place();
+/// Starts without a pose: how many were right, and how many sure of a wrong pose.
+fn starts(place: &Place, seeds: std::ops::Range<u64>) -> (u32, u32) {
+    let count = seeds.end - seeds.start;
     let mut buffer = vec![0; Pyramid::bytes(place.field.grid().shape())];
     let pyramid = Pyramid::new(place.field.as_slice(), &mut buffer).expect("fits");
     let (mut good, mut wrong, mut scans_needed, mut lookups) = (0, 0, 0, 0);
-    for seed in 0..100 {
+    for seed in seeds {
         let mut noise = Noise::new(seed, 11);
         let mut pose = home::home_place(&place.world, &place.map, 0.25, &mut noise);
         let start = pose;
         let mut robot = Robot::new(pyramid, LocalizerConfig::DEFAULT);
-        let end = find(&mut robot, &place, &mut pose, 5, &mut noise);
+        let end = find(&mut robot, place, &mut pose, 5, &mut noise);
         lookups += robot.counters().lookups;
         match end {
             End::Right { scans } => {
@@ -126,20 +126,27 @@ fn starts_without_a_pose() {
         }
     }
     println!(
-        "start without a pose: {good} of 100 right, {wrong} wrong; {:.1} scans, {:.1} M lookups",
+        "start without a pose: {good} of {count} right, {wrong} wrong; {:.1} scans, {:.1} M lookups",
         f64::from(scans_needed as u32) / f64::from(good),
-        lookups as f64 / 1e8
+        lookups as f64 / 1e6 / count as f64
     );
-    assert!(good >= 98 && wrong == 0);
+    (good, wrong)
 }
 
 #[test]
-fn notices_that_it_was_moved_and_finds_itself_again() {
-    let place = place();
+fn starts_without_a_pose() {
+    let (good, wrong) = starts(&place(), 0..100);
+    assert!(good >= 98 && wrong == 0);
+}
+
+/// Moves by hand: how many were noticed within three scans, how many recovered from, and how many ended sure of a wrong
+/// pose.
+fn moves(place: &Place, seeds: std::ops::Range<u64>) -> (u32, u32, u32) {
+    let count = seeds.end - seeds.start;
     let mut buffer = vec![0; Pyramid::bytes(place.field.grid().shape())];
     let pyramid = Pyramid::new(place.field.as_slice(), &mut buffer).expect("fits");
     let (mut noticed, mut recovered, mut wrong) = (0, 0, 0);
-    for seed in 0..100 {
+    for seed in seeds {
         let mut noise = Noise::new(seed, 12);
         let mut pose = home::home_place(&place.world, &place.map, 0.25, &mut noise);
         let mut robot = Robot::new(pyramid, LocalizerConfig::DEFAULT);
@@ -147,7 +154,7 @@ fn notices_that_it_was_moved_and_finds_itself_again() {
         let mut wheels = Pose::IDENTITY;
         for _ in 0..5 {
             robot.update(&scan(&place.world, pose, &mut noise), wheels);
-            (pose, wheels) = drive(&place, pose, &mut noise);
+            (pose, wheels) = drive(place, pose, &mut noise);
         }
         assert!(
             robot.pose().is_some(),
@@ -164,7 +171,7 @@ fn notices_that_it_was_moved_and_finds_itself_again() {
             let verdict = robot.update(&scan(&place.world, pose, &mut noise), wheels);
             sure_of_wrong =
                 matches!(verdict, Verdict::Tracking(found, _) if !right(found.pose, pose));
-            (pose, wheels) = drive(&place, pose, &mut noise);
+            (pose, wheels) = drive(place, pose, &mut noise);
         }
         if !sure_of_wrong {
             noticed += 1;
@@ -178,11 +185,11 @@ fn notices_that_it_was_moved_and_finds_itself_again() {
             Verdict::Tracking(found, _) if right(found.pose, pose) => End::Right { scans: 1 },
             Verdict::Tracking(..) => End::Wrong { scans: 1 },
             _ => {
-                (pose, wheels) = drive(&place, pose, &mut noise);
+                (pose, wheels) = drive(place, pose, &mut noise);
                 let points = scan(&place.world, pose, &mut noise);
                 robot.update(&points, wheels);
                 while !robot.step(200_000) {}
-                find_on(&mut robot, &place, &mut pose, 8, &mut noise)
+                find_on(&mut robot, place, &mut pose, 8, &mut noise)
             }
         };
         match end {
@@ -195,10 +202,15 @@ fn notices_that_it_was_moved_and_finds_itself_again() {
         }
     }
     println!(
-        "moved by hand: {noticed} of 100 noticed within three scans, {recovered} recovered, {wrong} wrong"
+        "moved by hand: {noticed} of {count} noticed within three scans, {recovered} recovered, {wrong} wrong"
     );
-    // One or two of the hundred land where it looks much the same: at the other end of the corridor, behind a door.
-    assert!(noticed >= 95 && recovered >= 95 && wrong <= 2);
+    (noticed, recovered, wrong)
+}
+
+#[test]
+fn notices_that_it_was_moved_and_finds_itself_again() {
+    let (noticed, recovered, wrong) = moves(&place(), 0..100);
+    assert!(noticed >= 99 && recovered >= 95 && wrong == 0);
 }
 
 /// Goes on after the last scan: moves first.
@@ -225,12 +237,11 @@ fn find_on(
     End::Open
 }
 
-#[test]
-fn tracks_for_half_an_hour_among_people() {
-    let place = place();
+/// Half an hour among people: mean and worst error (m), scans that were doubtful, times lost.
+fn tracks(place: &Place, seed: u64) -> (f64, f64, u32, u32) {
     let mut buffer = vec![0; Pyramid::bytes(place.field.grid().shape())];
     let pyramid = Pyramid::new(place.field.as_slice(), &mut buffer).expect("fits");
-    let mut noise = Noise::new(1, 13);
+    let mut noise = Noise::new(seed, 13);
     let mut pose = home::home_place(&place.world, &place.map, 0.3, &mut noise);
     let mut robot = Robot::new(pyramid, LocalizerConfig::DEFAULT);
     robot.start_at(pose.into());
@@ -274,10 +285,13 @@ fn tracks_for_half_an_hour_among_people() {
         match robot.update(&points, wheels) {
             Verdict::Tracking(..) => {}
             Verdict::Doubtful(_) => doubtful += 1,
-            other => panic!("scan {k}: {other:?} at {pose:?}"),
+            other => println!("seed {seed} scan {k}: {other:?} at {pose:?}"),
         }
-        let found = robot.pose().expect("tracking");
-        let off = pose.between(found.into()).distance();
+        while !robot.step(200_000) {}
+        // What it would be without a pose.
+        let off = robot
+            .pose()
+            .map_or(1.0, |found| pose.between(found.into()).distance());
         metres += off;
         worst = worst.max(off);
         // Mostly straight on; turns where the way ends.
@@ -300,12 +314,42 @@ fn tracks_for_half_an_hour_among_people() {
     let mean = metres / f64::from(scans);
     let blocked = blocked / f64::from(scans / 50);
     println!(
-        "30 minutes, {:.1} % of the beams on people: mean error {:.1} mm, worst {:.1} mm, {doubtful} of {scans} scans doubtful",
+        "seed {seed}: 30 minutes, {:.1} % of the beams on people: mean error {:.1} mm, worst {:.1} mm, {doubtful} of {scans} scans doubtful",
         100.0 * blocked,
         1000.0 * mean,
         1000.0 * worst
     );
-    assert!(blocked > 0.18 && mean <= 0.02 && robot.counters().lost == 0);
+    assert!(blocked > 0.18);
+    (mean, worst, doubtful, robot.counters().lost)
+}
+
+#[test]
+fn tracks_for_half_an_hour_among_people() {
+    let (mean, _, _, lost) = tracks(&place(), 1);
+    assert!(mean <= 0.02 && lost == 0);
+}
+
+/// What one set of seeds shows may be luck: five others, and the sum of them.
+#[test]
+#[ignore = "takes minutes: run it after a change to the localizer"]
+fn other_seeds() {
+    let place = place();
+    let (mut good, mut wrong) = (0, 0);
+    for set in 1..=5u64 {
+        let (right, sure_of_wrong) = starts(&place, 1000 * set..1000 * set + 100);
+        (good, wrong) = (good + right, wrong + sure_of_wrong);
+    }
+    let mut moved = (0, 0, 0);
+    for set in 1..=5u64 {
+        let (noticed, recovered, wrong) = moves(&place, 1000 * set..1000 * set + 100);
+        moved = (moved.0 + noticed, moved.1 + recovered, moved.2 + wrong);
+    }
+    let tracked: Vec<_> = (2..=6).map(|seed| tracks(&place, seed)).collect();
+    println!(
+        "of 500 starts {good} right, {wrong} wrong; of 500 moves {moved:?} noticed, recovered, wrong; {tracked:?}"
+    );
+    assert!(good >= 490 && wrong == 0 && moved.1 >= 475 && moved.2 <= 5);
+    assert!(tracked.iter().all(|&(mean, _, _, _)| mean <= 0.02));
 }
 
 #[test]

@@ -111,7 +111,16 @@ pub fn align<F: Field + ?Sized>(
                 needed,
             });
         }
-        let step = sums.step(config).ok_or(MatchError::Degenerate)?;
+        // Bytes are steps: passes may hand two poses back and forth, and end between them if they go slower.
+        let pace = match if stride > 1 { iterations } else { fine_passes } {
+            0..6 => 1.0,
+            6..10 => 0.5,
+            _ => 0.25,
+        };
+        let step = sums
+            .step(config)
+            .ok_or(MatchError::Degenerate)?
+            .map(|along| pace * along);
         pose = Sums::moved(field.shape(), pose, step);
         let length = field.shape().resolution() * math::sqrt(step[0] * step[0] + step[1] * step[1]);
         let small = |factor: f32| {
@@ -125,7 +134,7 @@ pub fn align<F: Field + ?Sized>(
             }
             continue;
         }
-        // Bytes are steps: two poses a fraction of a millimetre apart may hand the search back and forth.
+        // And by a fraction of a millimetre they may do so for ever.
         fine_passes += 1;
         if small(1.0) || (fine_passes > 5 && small(10.0)) {
             break sums;
@@ -160,6 +169,9 @@ struct Axes {
     lever: f32,
     /// The curvature so scaled.
     scaled: Sym3,
+    /// What is added to it before it is solved: a map's walls are some cells thick, flat inside, and what their field
+    /// bends there says too little of how far the next step may go.
+    damping: f32,
     /// Its eigenvalues and vectors, where some direction may be weak: 40 000 instructions on a core without an FPU.
     pairs: Option<[(f32, [f32; 3]); 3]>,
 }
@@ -218,9 +230,13 @@ impl Sums {
                 let lever = sums.mean_lever(&curvature);
                 let scaled = curvature.theta_scaled(1.0 / lever);
                 let pairs = (!well_determined(&scaled, weak_share)).then(|| scaled.eigen());
+                // Half of what thin walls would have.
+                let expected = 0.5 * Self::wall(field) * f32::from(sums.inliers);
+                let damping = 0.5 * math::max(expected - (scaled.xx + scaled.yy), 0.0);
                 Axes {
                     lever,
                     scaled,
+                    damping,
                     pairs,
                 }
             }
@@ -272,12 +288,15 @@ impl Sums {
         let Axes {
             lever,
             scaled,
+            damping,
             pairs,
         } = self.axes;
         let slope = [slope[0], slope[1], slope[2] / lever];
         let mut step = match pairs {
-            None => scaled.solve(slope)?,
-            Some(pairs) => along_strong(&pairs, slope, config.weak_share)?,
+            None => scaled
+                .plus(&Sym3::diagonal(damping, damping, damping))
+                .solve(slope)?,
+            Some(pairs) => along_strong(&pairs, slope, damping, config.weak_share)?,
         };
         step[2] /= lever;
         // Half a metre and a third of a radian at most: the parabolas end long before.
@@ -410,6 +429,7 @@ fn well_determined(m: &Sym3, weak_share: f32) -> bool {
 fn along_strong(
     pairs: &[(f32, [f32; 3]); 3],
     slope: [f32; 3],
+    damping: f32,
     weak_share: f32,
 ) -> Option<[f32; 3]> {
     let strongest = pairs[2].0;
@@ -421,7 +441,8 @@ fn along_strong(
         if *value < weak_share * strongest {
             continue;
         }
-        let along = (axis[0] * slope[0] + axis[1] * slope[1] + axis[2] * slope[2]) / value;
+        let along =
+            (axis[0] * slope[0] + axis[1] * slope[1] + axis[2] * slope[2]) / (value + damping);
         for k in 0..3 {
             step[k] += along * axis[k];
         }
@@ -501,7 +522,8 @@ impl Pass {
             gx += slope_x;
             gy += slope_y;
             gt += slope_y * lx - slope_x * ly;
-            if CURVED {
+            // What bends upwards is a corner or the foot of a slope: no parabola to climb.
+            if CURVED && xx + yy < 0 {
                 let (xt, yt) = (xy * lx - xx * ly, yy * lx - xy * ly);
                 sxx += xx;
                 sxy += xy;
