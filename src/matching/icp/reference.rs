@@ -82,7 +82,7 @@ impl<const N: usize> Reference<N> {
 
     /// Lays lines through `points`, in the order of measurement, in place of those before.
     ///
-    /// About 130 instructions a point on an M4F.
+    /// The larger part of the preparation that `bench` counts.
     pub fn assign(&mut self, points: &[ScanPoint]) {
         self.count = lines::lay(&mut self.lines, points);
     }
