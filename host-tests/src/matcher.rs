@@ -30,6 +30,8 @@ impl<const N: usize> Matcher<N> {
     }
 
     /// Matches a pair; `observe` is shown the estimate after every pass.
+    // A function of its own, so that its instructions can be counted: `tests/host_cost.rs`.
+    #[inline(never)]
     pub fn run(
         &mut self,
         list: &Pairs,

@@ -19,6 +19,17 @@ fn run(seed: u64, seconds: f64) -> Drive {
     drive(&settings, &mut Sensor::ld06())
 }
 
+/// The firmware's pipeline, with the lidar where the simulated robot has it.
+fn pipeline() -> Box<Pipeline<456>> {
+    Pipeline::new(OdometryConfig {
+        mount: Mount {
+            robot_from_lidar: Settings::DEFAULT.mount.into(),
+            ..Mount::DEFAULT
+        },
+        ..OdometryConfig::DEFAULT
+    })
+}
+
 /// FNV-1a over bytes.
 fn hash(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, &b| {
@@ -53,14 +64,7 @@ fn the_drive_through_the_flat_ends_within_3_cm_and_half_a_degree() {
         last.time,
         run.distance
     );
-    let config = OdometryConfig {
-        mount: Mount {
-            robot_from_lidar: Settings::DEFAULT.mount.into(),
-            ..Mount::DEFAULT
-        },
-        ..OdometryConfig::DEFAULT
-    };
-    let mut pipeline = Pipeline::<456>::new(config);
+    let mut pipeline = pipeline();
     let origin = run.moments[turns[0].ends_at - 1].truth;
     let mut error = (0.0, 0.0);
     for turn in &turns {
@@ -89,14 +93,7 @@ fn the_drive_through_the_flat_ends_within_3_cm_and_half_a_degree() {
 fn a_gap_between_scans_is_bridged_by_the_wheels() {
     let run = run(1, 30.0);
     let (turns, _) = capture::turns("ld06", &run.bytes).expect("an LD06");
-    let config = OdometryConfig {
-        mount: Mount {
-            robot_from_lidar: Settings::DEFAULT.mount.into(),
-            ..Mount::DEFAULT
-        },
-        ..OdometryConfig::DEFAULT
-    };
-    let mut pipeline = Pipeline::<456>::new(config);
+    let mut pipeline = pipeline();
     let origin = run.moments[turns[0].ends_at - 1].truth;
     let mut before = origin;
     for (number, turn) in turns.iter().enumerate() {

@@ -98,8 +98,8 @@ impl<const N: usize> Points<N> {
                 continue;
             }
             for beam in beams {
-                if let Some(mean) = sweep.mean(core::slice::from_ref(beam)) {
-                    sweep.place(mean, &mut self.points);
+                if let Some(range) = beam.range.within(sweep.least, sweep.span) {
+                    sweep.place((beam.bearing.0, range, beam.age), &mut self.points);
                 }
             }
         }
@@ -125,11 +125,15 @@ struct Sweep {
 }
 
 impl Sweep {
-    /// Bearing, range and age of the mean of neighbouring beams; `None` unless all have a range and lie on one surface.
+    /// Bearing, range and age of the mean of neighbouring beams; `None` unless there are several that all have a range
+    /// and lie on one surface.
+    #[inline]
     fn mean(&self, beams: &[Stored]) -> Option<(u16, u16, u16)> {
         /// 1/n in Q14.
         const SHARE: [u32; MERGE_MOST + 1] = [0, 16384, 8192, 5461, 4096];
-        let (first, last) = (beams.first()?, beams.last()?);
+        let [first, .., last] = beams else {
+            return None;
+        };
         let mut before = first.range.within(self.least, self.span)?;
         let mut sum = 0;
         let mut most = 0;

@@ -63,22 +63,7 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         let pretended = h.theta_scaled(1.0 / lever).quadratic(direction);
         let known = noise / (GUESS_SIGMA * GUESS_SIGMA);
         h = h.plus(&outer([x, y, t * lever]).scaled(known - pretended));
-        // The guess is kept along the direction ...
-        let kept = without(pose, guess, [x, y, t], lever);
-        // ... which is straight where the scene may be round: two passes lead back across it.
-        let all = Pass {
-            period: 1,
-            first: 0,
-            length: 1,
-            gate: FINE,
-        };
-        pose = kept;
-        for _ in 0..2 {
-            let across = FixedPose::new(pose).and_then(|at| task.step(at, all, None).ok());
-            pose = across.map_or(pose, |across| {
-                without(across.at.pose(), kept, [x, y, t], lever)
-            });
-        }
+        pose = kept(task, pose, guess, [x, y, t], lever);
     }
     let alike = sums.correlation();
     let information = h.scaled(1.0 / noise);
@@ -104,6 +89,31 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         starts: best.starts,
         rival: best.ratio,
     })
+}
+
+/// `pose`, but the guess along a direction that is not determined.
+// Seldom needed: apart, so that the passes of every match keep their registers.
+#[cold]
+#[inline(never)]
+fn kept(task: &Task<'_>, pose: Pose, guess: Pose, direction: [f32; 3], lever: f32) -> Pose {
+    const ALL: Pass = Pass {
+        period: 1,
+        first: 0,
+        length: 1,
+        gate: FINE,
+    };
+    let kept = without(pose, guess, direction, lever);
+    // The direction is straight where the scene may be round: two passes lead back across it.
+    let mut pose = kept;
+    for _ in 0..2 {
+        let Some(at) = FixedPose::new(pose) else {
+            break;
+        };
+        if let Ok(across) = task.step(at, ALL, None) {
+            pose = without(across.at.pose(), kept, direction, lever);
+        }
+    }
+    pose
 }
 
 /// `pose` without what it differs from `other` along a direction, headings as long as `lever`.
