@@ -223,7 +223,7 @@ impl<'a, const N: usize> Localizer<'a, N> {
         }
     }
 
-    /// Goes on with a search for about `budget` bytes looked up (3 instructions each on an M4F); true where there is
+    /// Goes on with a search for about `budget` bytes looked up (7 to 17 instructions each on an M4F); true where there is
     /// nothing more to do before the next scan.
     ///
     /// A call looks up at most `budget` bytes and then finishes the block that it is at: 12 000 bytes more.
