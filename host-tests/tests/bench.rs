@@ -1,15 +1,15 @@
 //! One match on the emulated boards: the host's bits, and no more instructions than before. What is not chosen costs no flash.
 
+mod common;
+
 use std::{collections::BTreeSet, fs, path::Path};
 
+use common::figures::Risen;
 use host_tests::board::{
     Board,
     bench::{self, Figures, Outcome},
 };
 use object::{Object as _, ObjectSymbol as _};
-
-/// A rise by more than this fails: 2 %.
-const ALLOWED: f64 = 1.02;
 
 fn poses(outcomes: &[Outcome]) -> Vec<(bool, [u32; 3])> {
     outcomes
@@ -32,7 +32,7 @@ fn pairs_are_matched_to_the_same_bits_at_no_higher_cost() {
     let golden: Vec<Figures> =
         serde_json::from_str(include_str!("../golden/bench.json")).expect("a list of figures");
     let list = bench::simulated();
-    let mut risen = Vec::new();
+    let mut risen = Risen::default();
     for (name, which) in bench::ALL {
         let board = Board::named(name).expect("a board");
         let (outcomes, stack) = bench::on_board(board, &list, which)
@@ -55,16 +55,11 @@ fn pairs_are_matched_to_the_same_bits_at_no_higher_cost() {
             ("matched_max", before.matched_max, now.matched_max),
             ("stack_bytes", before.stack_bytes, now.stack_bytes),
         ] {
-            if f64::from(now) > f64::from(before) * ALLOWED {
-                risen.push(format!("{name} {which:?}: {what} was {before}, is {now}"));
-            }
+            let name = format!("{name} {which:?}: {what}");
+            risen.compare(&name, before.into(), now.into());
         }
     }
-    assert!(
-        risen.is_empty(),
-        "{}\nIf it must be: cargo run --release -- bench --bless, with the reason in the commit's message",
-        risen.join("\n")
-    );
+    risen.expect_none("bench");
 }
 
 /// The rooms of `src/matching/` of which a function is in a program.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use beamfix_app::{BEAMS, telemetry::Telemetry};
 use host_tests::{
     board::{BOARDS, Replay, difference, emulator::Count, recording::Recording, stream},
-    encoder::{Echo, Encoder as _, ld06::Sensor},
+    encoder::{Echo, Encoder as _, damage, ld06::Sensor},
     readers,
     sim::drive::{Settings, drive},
 };
@@ -99,24 +99,6 @@ fn every_board_replays_a_real_log_to_the_same_bits() {
     }
 }
 
-/// A hundredth each of the bytes is lost, doubled or has a bit flipped.
-fn damaged(bytes: &[u8]) -> Vec<u8> {
-    let mut random = 1u64;
-    let mut damaged = Vec::new();
-    for &byte in bytes {
-        random = random
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        match (random >> 33) % 300 {
-            0 => {}
-            1 => damaged.extend([byte, byte]),
-            2 => damaged.push(byte ^ 1 << (random >> 60 & 7)),
-            _ => damaged.push(byte),
-        }
-    }
-    damaged
-}
-
 #[test]
 fn a_damaged_line_costs_packets_not_the_run() {
     let settings = Settings {
@@ -124,7 +106,7 @@ fn a_damaged_line_costs_packets_not_the_run() {
         ..Settings::DEFAULT
     };
     let drive = drive(&settings, &mut Sensor::ld06());
-    let bytes = damaged(&drive.bytes);
+    let bytes = damage::a_hundredth(&drive.bytes);
     let mut recording = Recording::new();
     recording.lidar(&bytes);
     recording.ask_health();

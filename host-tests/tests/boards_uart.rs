@@ -3,7 +3,7 @@
 //! Three minutes on each board (a quarter of an hour in all):
 //! `cargo test --release --test boards_uart -- --ignored --nocapture`
 
-use beamfix_app::{BEAMS, demo::Demo, ring::Ring, telemetry::Telemetry};
+use beamfix_app::{BEAMS, checks, demo::Demo, telemetry::Telemetry};
 use host_tests::board::{
     BOARDS, Board, Replay, STM32F4, difference,
     firmware::Firmware,
@@ -11,6 +11,7 @@ use host_tests::board::{
     rp2040js::{Job, PICO, PICO_EMBASSY},
     stream,
 };
+use host_tests::encoder::damage;
 
 /// Of the demo's robot, which drives in a circle as long as one likes.
 fn ld06(seconds: f64) -> Vec<u8> {
@@ -21,24 +22,6 @@ fn ld06(seconds: f64) -> Vec<u8> {
 
 fn boards() -> impl Iterator<Item = &'static Board> {
     BOARDS.iter().chain([&STM32F4])
-}
-
-/// A hundredth of the bytes is lost, doubled or has a bit flipped, as many of each.
-fn damaged(bytes: &[u8]) -> Vec<u8> {
-    let mut random = 1u64;
-    let mut damaged = Vec::new();
-    for &byte in bytes {
-        random = random
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        match (random >> 33) % 300 {
-            0 => {}
-            1 => damaged.extend([byte, byte]),
-            2 => damaged.push(byte ^ 1 << (random >> 60 & 7)),
-            _ => damaged.push(byte),
-        }
-    }
-    damaged
 }
 
 /// What the application makes of these bytes here.
@@ -75,7 +58,7 @@ fn no_byte_is_lost_and_every_pose_is_out() {
 )]
 fn a_damaged_line_resets_no_board() {
     // `compare` expects the one ready frame of the start, and then the same messages as here: a reset would send another.
-    let bytes = damaged(&ld06(10.0));
+    let bytes = damage::a_hundredth(&ld06(10.0));
     for board in boards() {
         run(board, &bytes, 30);
     }
@@ -96,7 +79,7 @@ fn three_minutes_without_a_loss_on_every_board() {
 #[test]
 #[ignore = "ten minutes: cargo test --release --test boards_uart -- --ignored --nocapture"]
 fn three_minutes_on_a_damaged_line_on_every_board() {
-    let bytes = damaged(&ld06(180.0));
+    let bytes = damage::a_hundredth(&ld06(180.0));
     let health = here(&bytes).messages;
     println!("{:?}", health.last());
     std::thread::scope(|scope| {
@@ -205,11 +188,5 @@ fn a_pico_counts_and_survives_forced_overruns() {
 
 #[test]
 fn a_ring_counts_what_it_has_no_room_for() {
-    let ring = Ring::<16>::new();
-    (0..20).for_each(|byte| ring.push(byte));
-    ring.lose(3);
-    assert_eq!(ring.lost(), 7);
-    let kept: Vec<u8> = std::iter::from_fn(|| ring.pop()).collect();
-    assert_eq!(kept, (0..16).collect::<Vec<u8>>());
-    assert!(ring.is_empty());
+    checks::a_ring_counts_what_it_has_no_room_for();
 }

@@ -1,13 +1,13 @@
 //! What the firmware takes on the emulated boards must not rise unnoticed.
 
+mod common;
+
+use common::figures::Risen;
 use host_tests::board::{
     BOARDS,
     card::{Card, measure, recording},
     real::{REAL, RealCard},
 };
-
-/// A rise by more than this fails: 2 %.
-const ALLOWED: f64 = 1.02;
 
 #[test]
 #[cfg_attr(
@@ -18,7 +18,7 @@ fn no_figure_rises() {
     let golden: Vec<Card> =
         serde_json::from_str(include_str!("../golden/card.json")).expect("a list of cards");
     let recording = recording();
-    let mut risen = Vec::new();
+    let mut risen = Risen::default();
     for board in BOARDS {
         let now = measure(board, &recording).unwrap_or_else(|error| panic!("{error:#}"));
         println!("{now:?}");
@@ -42,21 +42,17 @@ fn no_figure_rises() {
                 now.instructions_max,
             ),
         ] {
-            if now as f64 > before as f64 * ALLOWED {
-                risen.push(format!("{}: {what} was {before}, is {now}", board.name));
-            } else if (now as f64) < before as f64 / ALLOWED {
-                println!("{}: {what} fell from {before} to {now}", board.name);
-            }
+            risen.compare(
+                &format!("{}: {what}", board.name),
+                before as f64,
+                now as f64,
+            );
         }
         if before.rustc != now.rustc {
             println!("measured with rustc {}, now {}", before.rustc, now.rustc);
         }
     }
-    assert!(
-        risen.is_empty(),
-        "{}\nIf it must be: cargo run --release -- card --bless, with the reason in the commit's message",
-        risen.join("\n")
-    );
+    risen.expect_none("card");
 }
 
 /// Flash and statics; what stands beside them in the table is reckoned from the cards above.
@@ -71,6 +67,7 @@ fn no_firmware_of_a_real_board_grows() {
     let golden: Vec<RealCard> =
         serde_json::from_str(include_str!("../golden/boards.json")).expect("a list of cards");
     assert_eq!(golden.len(), REAL.len());
+    let mut risen = Risen::default();
     for (board, before) in REAL.iter().zip(&golden) {
         let core = cores.iter().find(|card| card.board == board.emulated);
         let now = board
@@ -82,11 +79,10 @@ fn no_firmware_of_a_real_board_grows() {
             ("flash_bytes", before.flash_bytes, now.flash_bytes),
             ("ram_bytes", before.ram_bytes, now.ram_bytes),
         ] {
-            assert!(
-                now as f64 <= before as f64 * ALLOWED,
-                "{}: {what} was {before}, is {now}\nIf it must be: cargo run --release -- card --bless, with the reason \
-                 in the commit's message",
-                board.name
+            risen.compare(
+                &format!("{}: {what}", board.name),
+                before as f64,
+                now as f64,
             );
         }
         // The rest follows from these and the core's figures.
@@ -97,4 +93,5 @@ fn no_firmware_of_a_real_board_grows() {
             board.name
         );
     }
+    risen.expect_none("card");
 }

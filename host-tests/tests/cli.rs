@@ -1,28 +1,17 @@
 //! The tool as scripts meet it: exit statuses, one clear line for a bad file, one JSON object.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+mod common;
 
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use common::tool::{beamfix, folder, json};
 use flate2::{Compression, write::GzEncoder};
 use host_tests::encoder::ld06::Sensor;
 use host_tests::sim::{Noise, Settings, Still, TruePose, drive, scenes};
 use serde_json::Value;
 use std::io::Write;
-
-/// A folder of its own for each test.
-fn folder(name: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    fs::create_dir_all(&path).expect("a folder for the test");
-    path
-}
-
-fn beamfix(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_beamfix"))
-        .args(arguments)
-        .output()
-        .expect("the tool starts")
-}
 
 /// Writes `content`, runs the tool over it.
 fn over(path: &Path, content: &[u8], arguments: &[&str]) -> Output {
@@ -33,22 +22,6 @@ fn over(path: &Path, content: &[u8], arguments: &[&str]) -> Output {
         .map(|&a| if a == "FILE" { path } else { a })
         .collect();
     beamfix(&arguments)
-}
-
-fn json(output: &Output) -> Value {
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    let text = String::from_utf8(output.stdout.clone()).expect("text");
-    assert_eq!(
-        text.trim_end().lines().count(),
-        1,
-        "one object, one line: {text}"
-    );
-    serde_json::from_str(&text).expect("JSON")
 }
 
 /// Status 2, nothing on stdout, one line on stderr that holds all of `words`.

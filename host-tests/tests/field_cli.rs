@@ -2,32 +2,14 @@
 
 mod common;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::{Command, Output},
-};
+use std::fs;
 
 use beamfix::sensor_model::likelihood_field::stored;
-use common::shared;
+use common::{
+    shared,
+    tool::{beamfix, folder, text},
+};
 use host_tests::{map_file, sim::home};
-
-fn beamfix(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_beamfix"))
-        .args(arguments)
-        .output()
-        .expect("the tool starts")
-}
-
-fn folder(name: &str) -> PathBuf {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
-    fs::create_dir_all(&folder).expect("a folder");
-    folder
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a path in UTF-8")
-}
 
 #[test]
 fn a_map_becomes_a_table_for_flash() {

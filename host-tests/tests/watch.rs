@@ -1,40 +1,14 @@
 //! `watch`: an emulated board is followed live, drawn, and recorded; the recording replays to the same bits.
 
+mod common;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 use beamfix_app::{App, AppConfig, CONFIG, telemetry::Reset};
+use common::tool::{beamfix, folder, json, text};
 use host_tests::encoder::ld06::Sensor;
 use host_tests::sim::drive::{Settings, drive};
-use serde_json::Value;
-
-fn folder(name: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    fs::create_dir_all(&path).expect("a folder for the test");
-    path
-}
-
-fn beamfix(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_beamfix"))
-        .args(arguments)
-        .output()
-        .expect("the tool starts")
-}
-
-fn json(output: &Output) -> Value {
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    serde_json::from_slice(&output.stdout).expect("JSON")
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a plain path")
-}
 
 /// PNG, and large enough to hold a drawing.
 fn is_picture(path: &Path) {

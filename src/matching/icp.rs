@@ -34,7 +34,9 @@ use pass::{FixedPose, Pass, Sums};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Search {
-    /// By a few centimetres and degrees: odometry. The guess alone is tried first, and others only if it fails.
+    /// By a few centimetres and degrees: odometry. The guess alone is tried first, and others only if it fails. What is
+    /// found far from the guess (0.75 m, a turn counted at 3 m) must explain more of the scan, and is refused as
+    /// ambiguous where another pose explains nearly as much.
     #[default]
     Local,
     /// By 40 cm and 45°, or not there at all: always a bounded number of starts around it.
@@ -46,8 +48,8 @@ pub enum Search {
 pub struct IcpConfig {
     /// How far the guess may be off. Default [`Search::Local`].
     pub search: Search,
-    /// Beams in a coarse pass; all are used in the last two. Default 90: four times fewer cost half the accuracy, which
-    /// the last passes win back.
+    /// Beams in a coarse pass; all are used in the last two. Default 45: the accuracy that fewer cost is won back by
+    /// the last passes.
     pub coarse_beams: u16,
     /// Fewest beams that must agree with the reference. Default 30.
     pub min_inliers: u16,

@@ -43,12 +43,12 @@ impl Motion {
     /// Velocity during a scan whose middle was found at `middle`: that of the wheels and of what they missed on the
     /// way from the last scan's middle. Without wheels they missed all of it.
     pub fn during(&self, middle: Pose, rolling: Option<Twist>, times: Times) -> Twist {
+        /// Less is the noise of two matches (m, rad): wheels know better.
+        const SLIP: (f32, f32) = (0.01, 0.006);
         if times.seconds <= 0.0 {
             // Over a gap of unknown length there is no velocity.
             return Twist::ZERO;
         }
-        /// Less is the noise of two matches (m, rad): wheels know better.
-        const SLIP: (f32, f32) = (0.01, 0.006);
         let between = times.seconds + 0.5 * (self.duration - times.duration);
         let by_wheels = rolling.unwrap_or(Twist::ZERO);
         let rolled = self.rolling.over(0.5 * self.duration)

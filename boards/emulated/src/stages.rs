@@ -1,5 +1,5 @@
-//! Every choice of every stage of ICP, and the virtual scan, linked once so that `prove-no-panic` sees them and their
-//! size can be told from that of one choice a stage.
+//! Every choice of every stage of ICP, and the virtual scan, linked once so that `prove-no-panic` sees them, and so that
+//! a program with one choice a stage can be seen not to have the others.
 //!
 //! No file, no measurement: points come from outside, and what is found goes there.
 

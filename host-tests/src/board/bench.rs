@@ -1,7 +1,5 @@
 //! Pairs of scans on an emulated board, or here: poses and instructions.
 
-use std::path::PathBuf;
-
 use anyhow::{Result, ensure};
 use beamfix::{
     geometry::Pose,
@@ -12,8 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Board,
+    card::keep,
     emulator::{self, Count},
-    root,
 };
 use crate::{
     readers::pairs::{self, Pair},
@@ -80,10 +78,17 @@ impl Figures {
     }
 }
 
-/// Where the figures over [`simulated`] pairs are kept.
-#[must_use]
-pub fn golden() -> PathBuf {
-    root().join("host-tests/golden/bench.json")
+/// Measures the [`simulated`] pairs everywhere and makes the figures the golden ones: `host-tests/golden/bench.json`.
+pub fn bless() -> Result<Vec<Figures>> {
+    let list = simulated();
+    let mut figures = Vec::new();
+    for (name, which) in ALL {
+        let board = Board::named(name)?;
+        let (outcomes, stack) = on_board(board, &list, which)?;
+        figures.push(Figures::new(board, which, &outcomes, stack));
+    }
+    keep("bench.json", &figures)?;
+    Ok(figures)
 }
 
 /// Forty pairs of 360 beams in furnished offices, each in one of its own; the guess off by up to 5 cm and 3 degrees.

@@ -101,9 +101,8 @@ pub fn measure(board: &Board, recording: &Recording) -> Result<Card> {
 
 /// Makes these the golden figures: `host-tests/golden/card.json`, `boards.json`, and the rows of the README's tables.
 pub fn bless(cards: &[Card], boards: &[RealCard]) -> Result<()> {
-    let golden = root().join("host-tests/golden");
-    fs::write(golden.join("card.json"), pretty(cards)?)?;
-    fs::write(golden.join("boards.json"), pretty(boards)?)?;
+    keep("card.json", cards)?;
+    keep("boards.json", boards)?;
     let mut rows: Vec<(String, String)> = Vec::new();
     rows.extend(
         cards
@@ -126,8 +125,11 @@ pub fn bless(cards: &[Card], boards: &[RealCard]) -> Result<()> {
     fs::write(&readme, text).with_context(|| readme.display().to_string())
 }
 
-fn pretty(value: &(impl Serialize + ?Sized)) -> Result<String> {
-    Ok(serde_json::to_string_pretty(value)? + "\n")
+/// Writes figures into `host-tests/golden/`.
+pub(super) fn keep(name: &str, figures: &(impl Serialize + ?Sized)) -> Result<()> {
+    let path = root().join("host-tests/golden").join(name);
+    let text = serde_json::to_string_pretty(figures)? + "\n";
+    fs::write(&path, text).with_context(|| path.display().to_string())
 }
 
 /// Bytes in flash and of statics in RAM, which lies between these addresses.

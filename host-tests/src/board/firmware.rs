@@ -58,7 +58,8 @@ impl Firmware {
             "" => self.package,
             other => other,
         };
-        let proof = match self.is_proven && (program == self.package || program == "maps") {
+        let has_proof = program == self.package || matches!(program, "maps" | "stages");
+        let proof = match self.is_proven && has_proof {
             true => "prove-no-panic",
             false => "",
         };

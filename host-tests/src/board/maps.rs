@@ -1,11 +1,9 @@
 //! What everything that matches against maps takes on the emulated boards.
 
-use std::fs;
-
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use serde::{Deserialize, Serialize};
 
-use super::{Board, fields, fields::Costs, root, start, start::StartCosts};
+use super::{Board, card::keep, fields, fields::Costs, start, start::StartCosts};
 
 /// The board that starts without a pose are measured on: the map and the search are too large for the smaller ones.
 const STARTS_ON: &str = "m4f";
@@ -101,8 +99,6 @@ impl Card {
 
     /// Makes these the golden figures: `host-tests/golden/maps.json`.
     pub fn bless(&self) -> Result<()> {
-        let path = root().join("host-tests/golden/maps.json");
-        let text = serde_json::to_string_pretty(self)? + "\n";
-        fs::write(&path, text).with_context(|| path.display().to_string())
+        keep("maps.json", self)
     }
 }

@@ -19,3 +19,22 @@ pub fn hit(line: &mut Vec<u8>, faults: usize, rng: &mut impl Rng) {
         }
     }
 }
+
+/// The line with a hundredth of its bytes lost, doubled or with a bit flipped, as many of each; the same every time.
+#[must_use]
+pub fn a_hundredth(line: &[u8]) -> Vec<u8> {
+    let mut random = 1u64;
+    let mut damaged = Vec::new();
+    for &byte in line {
+        random = random
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        match (random >> 33) % 300 {
+            0 => {}
+            1 => damaged.extend([byte, byte]),
+            2 => damaged.push(byte ^ 1 << (random >> 60 & 7)),
+            _ => damaged.push(byte),
+        }
+    }
+    damaged
+}

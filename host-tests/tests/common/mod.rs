@@ -1,5 +1,8 @@
-//! What the tests of fields and maps share.
+//! What tests share.
 #![allow(dead_code)]
+
+pub mod figures;
+pub mod tool;
 
 use std::path::{Path, PathBuf};
 

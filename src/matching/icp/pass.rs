@@ -151,7 +151,7 @@ const BLOCK: usize = 16;
 
 /// Runs one pass of `points` at `at` against `lines`.
 ///
-/// About 100 instructions a point on an M4F: what `bench` counts for a match is little else.
+/// What `bench` counts for a match is little else.
 pub(super) fn run(
     lines: &[Line],
     points: &[ScanPoint],

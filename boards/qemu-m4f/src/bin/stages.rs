@@ -1,4 +1,4 @@
-//! Every choice of every stage, for `prove-no-panic` and its size; see `beamfix_emulated::stages`.
+//! Every choice of every stage, for `prove-no-panic`; see `beamfix_emulated::stages`.
 #![no_std]
 #![no_main]
 
