@@ -86,7 +86,7 @@ impl Default for UpdateConfig {
 /// Enters a scan taken at `map_from_lidar`: occupied where beams end, free along them.
 ///
 /// Each cell counts once a scan, however many beams meet it, and where one beam ends no other makes free, so
-/// that walls seen at a grazing angle stay. About 15 instructions a cell crossed. Does nothing where the lidar
+/// that walls seen at a grazing angle stay. Does nothing where the lidar
 /// is off the grid or its pose is not finite. Returns the number of beams entered.
 pub fn update<S: AsRef<[u8]> + AsMut<[u8]>>(
     grid: &mut Grid<S>,

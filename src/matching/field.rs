@@ -4,6 +4,8 @@
 //! give the exact slope and curvature wherever in the cell the beam ends. (Bilinear interpolation would give the
 //! slope at the middle between two cells, and pull straight walls to the middles of cells.)
 
+use core::num::Wrapping;
+
 use super::{Match, MatchError, WeakDirection};
 use crate::{
     geometry::{Point, Pose},
@@ -11,7 +13,7 @@ use crate::{
     linalg::{Covariance, Information, Sym3},
     math,
     scan::points::ScanPoint,
-    sensor_model::likelihood_field::{Field, placement::Placement},
+    sensor_model::likelihood_field::{Bend, Field, placement::Placement},
 };
 
 /// When to stop, and what to believe.
@@ -19,9 +21,9 @@ use crate::{
 pub struct FieldConfig {
     /// Most passes over the beams. Default 20.
     pub max_iterations: u8,
-    /// A step shorter than this ends the search (m). Default 0.0002.
+    /// How near to the optimum to end (m): after a step of at most 20 times this, which leaves less. Default 0.0002.
     pub translation_tolerance: f32,
-    /// And turning less than this (rad). Default 0.0001.
+    /// And so for turning (rad). Default 0.0001.
     pub rotation_tolerance: f32,
     /// While far off, every so-many-th beam is enough. Default 4.
     pub coarse_stride: u8,
@@ -84,12 +86,14 @@ pub fn align<F: Field + ?Sized>(
         gate(field, 2.5 * field.scale().sigma),
         gate(field, config.inlier_distance),
     );
-    // The curvature hardly changes once the pose is good to a centimetre: passes over all beams share it.
+    let per_metre = 1.0 / field.shape().resolution();
+    // Neighbours are taken together until the steps are short. Then each beam speaks for itself, most often in one pass,
+    // with the curvature of the pass before: at the corners of walls neighbours do not agree.
     let mut curved: Option<Sums> = None;
     let mut fine_passes = 0;
     let sums = loop {
         let gate = if stride > 1 { gates.0 } else { gates.1 };
-        let known = curved.as_ref().filter(|_| fine_passes % 3 != 0);
+        let known = curved.as_ref();
         let sums = Sums::over(
             field,
             points,
@@ -100,9 +104,6 @@ pub fn align<F: Field + ?Sized>(
             known,
         )
         .ok_or(MatchError::BadGuess)?;
-        if stride == 1 {
-            curved = Some(sums);
-        }
         iterations += 1;
         let needed = sums.needed(config, points.len());
         if sums.inliers < needed {
@@ -122,10 +123,10 @@ pub fn align<F: Field + ?Sized>(
             .ok_or(MatchError::Degenerate)?
             .map(|along| pace * along);
         pose = Sums::moved(field.shape(), pose, step);
-        let length = field.shape().resolution() * math::sqrt(step[0] * step[0] + step[1] * step[1]);
+        let square = step[0] * step[0] + step[1] * step[1];
         let small = |factor: f32| {
-            length <= factor * config.translation_tolerance
-                && math::abs(step[2]) <= factor * config.rotation_tolerance
+            let cells = factor * config.translation_tolerance * per_metre;
+            square <= cells * cells && math::abs(step[2]) <= factor * config.rotation_tolerance
         };
         if stride > 1 {
             // A quarter of the beams leave the pose twice as uncertain as all: no use in more digits.
@@ -134,12 +135,14 @@ pub fn align<F: Field + ?Sized>(
             }
             continue;
         }
-        // And by a fraction of a millimetre they may do so for ever.
         fine_passes += 1;
-        if small(1.0) || (fine_passes > 5 && small(10.0)) {
+        if curved.is_some() && small(20.0) {
             break sums;
+        } else if curved.is_none() && small(10.0) {
+            curved = Some(sums);
         } else if iterations >= config.max_iterations {
-            return Err(MatchError::NotConverged { step: length });
+            let step = math::sqrt(square) / per_metre;
+            return Err(MatchError::NotConverged { step });
         }
     };
     sums.summary(field, points.len(), pose, iterations, config)
@@ -172,7 +175,7 @@ struct Axes {
     /// What is added to it before it is solved: a map's walls are some cells thick, flat inside, and what their field
     /// bends there says too little of how far the next step may go.
     damping: f32,
-    /// Its eigenvalues and vectors, where some direction may be weak: 40 000 instructions on a core without an FPU.
+    /// Its eigenvalues and vectors, where some direction may be weak.
     pairs: Option<[(f32, [f32; 3]); 3]>,
 }
 
@@ -189,18 +192,21 @@ impl Sums {
     ) -> Option<Self> {
         let placement = Placement::new(field.shape(), pose)?;
         let shape = field.shape();
+        let millimetres = math::round_to_i32(1000.0 * shape.resolution()).max(1) as u32;
         // 32 m make at most 256 levers.
-        let reach = 32.8 / shape.resolution();
-        let mut lever_shift = 0;
-        while reach > (256u32 << lever_shift) as f32 {
-            lever_shift += 1;
-        }
+        let lever_shift = u32::BITS - (128 / millimetres).leading_zeros();
         let mut sums = Self {
             stride: stride as u16,
             lever: (1u32 << lever_shift) as f32,
             ..Self::default()
         };
         let pass = Pass {
+            skip: stride.saturating_sub(1),
+            together: if stride == 1 {
+                (TOGETHER * millimetres).next_power_of_two()
+            } else {
+                1
+            },
             fine: (placement.shift - 6) & 31,
             lever_shift: (lever_shift + placement.shift) & 31,
             gate: i32::from(gate),
@@ -212,11 +218,10 @@ impl Sums {
                 ..placement
             },
         };
-        let most = if known.is_some() { SLOPES } else { CURVES };
-        for chunk in points.chunks((most * stride).max(1)) {
+        for chunk in points.chunks(CHUNK * stride) {
             let part = match known {
-                Some(_) => pass.sum::<F, false>(field, chunk, stride),
-                None => pass.sum::<F, true>(field, chunk, stride),
+                Some(_) => pass.slopes(field, chunk),
+                None => pass.curves(field, chunk),
             };
             sums.add(&part);
         }
@@ -246,10 +251,10 @@ impl Sums {
 
     fn add(&mut self, part: &Part) {
         for (total, part) in self.slope.iter_mut().zip(part.slope) {
-            *total += i64::from(part);
+            *total += i64::from(part.0);
         }
         for (total, part) in self.curvature.iter_mut().zip(part.curvature) {
-            *total += i64::from(part);
+            *total += i64::from(part.0);
         }
         self.bytes += part.bytes;
         self.inliers += part.inliers as u16;
@@ -299,14 +304,14 @@ impl Sums {
             Some(pairs) => along_strong(&pairs, slope, damping, config.weak_share)?,
         };
         step[2] /= lever;
-        // Half a metre and a third of a radian at most: the parabolas end long before.
-        let length = math::sqrt(step[0] * step[0] + step[1] * step[1]);
+        // Ten cells and a third of a radian at most: the parabolas end long before.
+        let (square, turn) = (step[0] * step[0] + step[1] * step[1], math::abs(step[2]));
+        if square <= 100.0 && turn <= 0.3 {
+            return Some(step);
+        }
         let factor = math::min(
-            1.0,
-            math::min(
-                10.0 / math::max(length, 1e-6),
-                0.3 / math::max(math::abs(step[2]), 1e-6),
-            ),
+            10.0 / math::max(math::sqrt(square), 10.0),
+            0.3 / math::max(turn, 0.3),
         );
         Some(step.map(|s| s * factor))
     }
@@ -323,12 +328,16 @@ impl Sums {
 
     /// `pose` moved by a step along the grid's axes, which turns about the lidar.
     fn moved(shape: &Shape, pose_in_map: Pose, step: [f32; 3]) -> Pose {
-        let axes = Pose {
-            x: 0.0,
-            y: 0.0,
-            ..shape.origin()
-        };
-        let shift = axes * Point::new(step[0], step[1]);
+        let mut shift = Point::new(step[0], step[1]);
+        // Most grids lie along the map's axes, and a sine in floats is dear without an FPU.
+        if shape.origin().theta != 0.0 {
+            let axes = Pose {
+                x: 0.0,
+                y: 0.0,
+                ..shape.origin()
+            };
+            shift = axes * shift;
+        }
         Pose::new(
             pose_in_map.x + shift.x * shape.resolution(),
             pose_in_map.y + shift.y * shape.resolution(),
@@ -377,7 +386,11 @@ impl Sums {
         }
         .scaled(per_beam * resolution * resolution);
         // Along the map's axes instead of the grid's.
-        let geometry = Covariance(geometry).rotated(field.shape().origin()).0;
+        let geometry = if field.shape().origin().theta == 0.0 {
+            geometry
+        } else {
+            Covariance(geometry).rotated(field.shape().origin()).0
+        };
         let information = geometry.scaled(1.0 / (sigma * sigma));
         let lever = math::max(self.mean_lever(&cells) * resolution, 1e-3);
         let scaled = geometry.theta_scaled(1.0 / lever);
@@ -458,10 +471,12 @@ fn gate<F: Field + ?Sized>(field: &F, distance: f32) -> u8 {
     (byte.max(0) as u8).max(scale.unexplored.saturating_add(10))
 }
 
-/// Most beams whose sums fit in 32 bits: slopes have 16 bits and a sign, levers 8.
-const SLOPES: usize = 32;
-/// And with curvatures, of 10 bits and two levers.
-const CURVES: usize = 16;
+/// Side of the square around a beam in which its neighbours are taken together with it: so many cells, up to twice that.
+const TOGETHER: u32 = 2;
+
+/// Most beams whose sums fit in 32 bits, with levers of 8 bits: of slopes to 1000 bytes a cell and curvatures to 500
+/// bytes a cell². What surfaces make is a tenth of that; sums over a table that holds anything else wrap.
+const CHUNK: usize = 64;
 
 /// What does not change during a pass.
 struct Pass {
@@ -472,72 +487,129 @@ struct Pass {
     lever_shift: u32,
     gate: i32,
     unexplored: i32,
+    /// Beams left out after each taken.
+    skip: usize,
+    /// Side of the square around a beam in which its neighbours are taken together with it (mm, a power of two).
+    together: u32,
 }
 
 /// Sums over a few beams.
 #[derive(Default)]
 struct Part {
-    slope: [i32; 3],
-    curvature: [i32; 6],
+    slope: [Wrapping<i32>; 3],
+    curvature: [Wrapping<i32>; 6],
     bytes: u32,
     inliers: u32,
     overlap: u32,
 }
 
 impl Pass {
-    /// Slopes, and with `CURVED` the curvatures too.
+    /// Slopes and curvatures, neighbours taken together: the slopes of a parabola at several places add up to that in
+    /// their middle, times their number.
     #[inline(never)]
-    fn sum<F: Field + ?Sized, const CURVED: bool>(
-        &self,
-        field: &F,
-        points: &[ScanPoint],
-        stride: usize,
-    ) -> Part {
+    fn curves<F: Field + ?Sized>(&self, field: &F, points: &[ScanPoint]) -> Part {
+        let mut part = Part::default();
+        let (place, shift) = (&self.placement, self.placement.shift & 31);
+        let half = (self.together >> 1) as i32;
+        let mut rest = points;
+        while let [first, others @ ..] = rest {
+            let corner = (i32::from(first.x) - half, i32::from(first.y) - half);
+            let (mut last, mut sum, mut n) = ((half, half), (half, half), 1);
+            rest = others;
+            while let [point, others @ ..] = rest {
+                let (x, y) = (i32::from(point.x) - corner.0, i32::from(point.y) - corner.1);
+                if (x | y) as u32 >= self.together {
+                    break;
+                }
+                last = (x, y);
+                sum = (sum.0 + x, sum.1 + y);
+                n += 1;
+                rest = others;
+            }
+            rest = rest.get(self.skip..).unwrap_or_default();
+            // Their cell: half-way between the first and the last.
+            let middle = ((half + last.0) >> 1, (half + last.1) >> 1);
+            let (x, y) = place.turned(corner.0 + middle.0, corner.1 + middle.1);
+            let x = place.x.wrapping_add(x as u32);
+            let y = place.y.wrapping_add(y as u32);
+            let (column, row) = (x >> shift, y >> shift);
+            let Some(cells) = field.around(column, row) else {
+                continue;
+            };
+            if cells.here < self.gate {
+                if cells.here != self.unexplored {
+                    part.overlap += n as u32;
+                }
+                continue;
+            }
+            // Seen from its corner: where the lidar is, then the sum of where the beams end, in 64ths of a cell.
+            let lidar = (
+                place.x.wrapping_sub(column << shift) as i32,
+                place.y.wrapping_sub(row << shift) as i32,
+            );
+            let (rx, ry) = place.turned(sum.0 + n * corner.0, sum.1 + n * corner.1);
+            let x = lidar.0.wrapping_mul(n).wrapping_add(rx) >> self.fine;
+            let y = lidar.1.wrapping_mul(n).wrapping_add(ry) >> self.fine;
+            let (dx, dy) = (x - (n << 5), y - (n << 5));
+            let Bend { xx, xy, yy } = cells.bend();
+            let slope_x = Wrapping((cells.right - cells.left) * (n << 5) + xx * dx + xy * dy);
+            let slope_y = Wrapping((cells.above - cells.below) * (n << 5) + yy * dy + xy * dx);
+            let (lx, ly) = (
+                Wrapping(-(lidar.0 >> self.lever_shift)),
+                Wrapping(-(lidar.1 >> self.lever_shift)),
+            );
+            part.slope[0] += slope_x;
+            part.slope[1] += slope_y;
+            part.slope[2] += slope_y * lx - slope_x * ly;
+            // What bends upwards is a corner or the foot of a slope: no parabola to climb.
+            if xx + yy < 0 {
+                let (xx, xy, yy) = (Wrapping(n * xx), Wrapping(n * xy), Wrapping(n * yy));
+                let (xt, yt) = (xy * lx - xx * ly, yy * lx - xy * ly);
+                let bends = [xx, xy, yy, xt, yt, yt * lx - xt * ly];
+                for (sum, bend) in part.curvature.iter_mut().zip(bends) {
+                    *sum += bend;
+                }
+            }
+            part.bytes += (cells.here * n) as u32;
+            part.inliers += n as u32;
+            part.overlap += n as u32;
+        }
+        part
+    }
+
+    /// Slopes, each beam by itself.
+    #[inline(never)]
+    fn slopes<F: Field + ?Sized>(&self, field: &F, points: &[ScanPoint]) -> Part {
         let mut part = Part::default();
         let [mut gx, mut gy, mut gt] = part.slope;
-        let [mut sxx, mut sxy, mut syy, mut sxt, mut syt, mut stt] = part.curvature;
         // Their number counts in the upper half, so that one register holds both.
-        let (mut bytes, mut beside) = (0u32, 0);
-        for point in points.iter().step_by(stride.max(1)) {
-            let (rx, ry) = self.placement.turned(point);
+        let mut bytes = 0u32;
+        for point in points {
+            let (rx, ry) = self.placement.turned(point.x.into(), point.y.into());
             let fx = self.placement.x.wrapping_add(rx as u32) >> self.fine;
             let fy = self.placement.y.wrapping_add(ry as u32) >> self.fine;
             let Some(cells) = field.around(fx >> 6, fy >> 6) else {
                 continue;
             };
             if cells.here < self.gate {
-                if CURVED {
-                    beside += u32::from(cells.here != self.unexplored);
-                }
                 continue;
             }
             let (dx, dy) = ((fx & 63) as i32 - 32, (fy & 63) as i32 - 32);
-            let xx = cells.right + cells.left - 2 * cells.here;
-            let yy = cells.above + cells.below - 2 * cells.here;
-            let xy = cells.corner + cells.here - cells.above - cells.right;
+            let Bend { xx, xy, yy } = cells.bend();
             // The slope in the cell's middle, and from there on.
-            let slope_x = ((cells.right - cells.left) << 5) + xx * dx + xy * dy;
-            let slope_y = ((cells.above - cells.below) << 5) + yy * dy + xy * dx;
-            let (lx, ly) = (rx >> (self.lever_shift & 31), ry >> (self.lever_shift & 31));
+            let slope_x = Wrapping(((cells.right - cells.left) << 5) + xx * dx + xy * dy);
+            let slope_y = Wrapping(((cells.above - cells.below) << 5) + yy * dy + xy * dx);
+            let (lx, ly) = (
+                Wrapping(rx >> self.lever_shift),
+                Wrapping(ry >> self.lever_shift),
+            );
             gx += slope_x;
             gy += slope_y;
             gt += slope_y * lx - slope_x * ly;
-            // What bends upwards is a corner or the foot of a slope: no parabola to climb.
-            if CURVED && xx + yy < 0 {
-                let (xt, yt) = (xy * lx - xx * ly, yy * lx - xy * ly);
-                sxx += xx;
-                sxy += xy;
-                syy += yy;
-                sxt += xt;
-                syt += yt;
-                stt += yt * lx - xt * ly;
-            }
             bytes += cells.here as u32 | 0x1_0000;
         }
         (part.bytes, part.inliers) = (bytes & 0xffff, bytes >> 16);
-        part.overlap = part.inliers + beside;
         part.slope = [gx, gy, gt];
-        part.curvature = [sxx, sxy, syy, sxt, syt, stt];
         part
     }
 }

@@ -24,7 +24,7 @@ pub struct Correlation {
 
 /// Compares `local`, placed at `map_from_local`, with `map`: [`occupancy`] bytes, unknown cells count as nothing.
 ///
-/// About 35 instructions a cell of `local`. A value is 0 where it is not defined: no overlap, or an even map.
+/// A value is 0 where it is not defined: no overlap, or an even map.
 #[must_use]
 pub fn correlate(map: &Grid<&[u8]>, local: &Grid<&[u8]>, map_from_local: Pose) -> Correlation {
     let mut sums = Sums::default();
@@ -140,7 +140,7 @@ pub enum Kernel {
     Five,
 }
 
-/// Smooths a grid in place, rows and then columns: what matches only nearly still correlates. 20 instructions a cell.
+/// Smooths a grid in place, rows and then columns: what matches only nearly still correlates.
 ///
 /// Cells beyond the edge count as those at the edge. Unknown cells take part as even odds.
 pub fn smooth<S: AsRef<[u8]> + AsMut<[u8]>>(grid: &mut Grid<S>, kernel: Kernel) {

@@ -119,7 +119,7 @@ fn normal_below(x: f32) -> f32 {
     if x < 0.0 { tail } else { 1.0 - tail }
 }
 
-/// A beam model as integers: two tables and one logarithm, 2 KB in all; about 40 instructions a beam.
+/// A beam model as integers: two tables and one logarithm, 2 KB in all.
 ///
 /// Off by at most 0.1 nat from [`BeamModel::likelihood`] where the expected range is 3σ and more from both ends.
 #[derive(Debug, Clone)]

@@ -244,6 +244,30 @@ pub struct Around {
     pub corner: i32,
 }
 
+/// Second derivatives of the bytes by column and row.
+#[derive(Debug, Clone, Copy)]
+pub struct Bend {
+    /// Twice by column.
+    pub xx: i32,
+    /// By each.
+    pub xy: i32,
+    /// Twice by row.
+    pub yy: i32,
+}
+
+impl Around {
+    /// How the bytes bend.
+    #[inline]
+    #[must_use]
+    pub const fn bend(&self) -> Bend {
+        Bend {
+            xx: self.right + self.left - 2 * self.here,
+            xy: self.corner + self.here - self.above - self.right,
+            yy: self.above + self.below - 2 * self.here,
+        }
+    }
+}
+
 /// Cells that beams can be looked up in: a whole table, or tiles.
 pub trait Field {
     /// Size, resolution and place.

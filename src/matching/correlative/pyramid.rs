@@ -45,7 +45,7 @@ impl<'a> Pyramid<'a> {
         w4 * h4 + w16 * h16
     }
 
-    /// Fills `buffer` with the maxima: about 40 instructions a cell.
+    /// Fills `buffer` with the maxima.
     pub fn new(field: LikelihoodField<&'a [u8]>, buffer: &'a mut [u8]) -> Result<Self, GridError> {
         let shape = *field.grid().shape();
         let (needed, passed) = (Self::bytes(&shape), buffer.len());

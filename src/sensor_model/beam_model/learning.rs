@@ -67,7 +67,7 @@ impl Learner {
 
     /// Takes a beam: its range (m; `None`: no return) and the one that the map says.
     ///
-    /// About 400 instructions on an M4F. An expected range that is not between 0 and the longest is left out.
+    /// An expected range that is not between 0 and the longest is left out.
     pub fn add(&mut self, range: Option<f32>, expected: f32) {
         let range_max = self.model.range_max;
         if !(expected > 0.0 && expected < range_max) || range.is_some_and(|z| !(z >= 0.0)) {

@@ -86,27 +86,21 @@ impl Placement {
         Ok(())
     }
 
-    /// A point as seen from the lidar, along the grid's axes (cells, `Q shift`).
+    /// A place as seen from the lidar, given in millimetres, along the grid's axes (cells, `Q shift`, modulo 2³²).
     #[inline]
     #[must_use]
-    pub fn turned(&self, point: &ScanPoint) -> (i32, i32) {
-        let (px, py) = (i32::from(point.x), i32::from(point.y));
-        // At most 46 340 mm times 2¹⁵: below 2³¹.
-        (
-            self.cos
-                .wrapping_mul(px)
-                .wrapping_sub(self.sin.wrapping_mul(py)),
-            self.sin
-                .wrapping_mul(px)
-                .wrapping_add(self.cos.wrapping_mul(py)),
-        )
+    pub fn turned(&self, x: i32, y: i32) -> (i32, i32) {
+        // A point is at most 46 340 mm away; times 2¹⁵: below 2³¹.
+        let (cx, sx) = (self.cos.wrapping_mul(x), self.sin.wrapping_mul(x));
+        let (cy, sy) = (self.cos.wrapping_mul(y), self.sin.wrapping_mul(y));
+        (cx.wrapping_sub(sy), sx.wrapping_add(cy))
     }
 
     /// Coordinates of a point (cells, `Q shift`).
     #[inline]
     #[must_use]
     pub fn place(&self, point: &ScanPoint) -> (u32, u32) {
-        let (x, y) = self.turned(point);
+        let (x, y) = self.turned(point.x.into(), point.y.into());
         (self.x.wrapping_add(x as u32), self.y.wrapping_add(y as u32))
     }
 

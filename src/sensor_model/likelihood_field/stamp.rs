@@ -61,7 +61,7 @@ struct Piece {
 
 /// Draws a scan taken at `map_from_lidar` onto `canvas`, which keeps what is higher.
 ///
-/// About 2 000 instructions a piece on an M4F; beams that fall within half a cell of the last piece share it.
+/// Beams that fall within half a cell of the last piece share it.
 /// Does nothing if the pose is not finite.
 pub fn scan<C: Canvas + ?Sized>(
     canvas: &mut C,
