@@ -392,18 +392,15 @@ impl Sums {
             Covariance(geometry).rotated(field.shape().origin()).0
         };
         let information = geometry.scaled(1.0 / (sigma * sigma));
-        let lever = math::max(self.mean_lever(&cells) * resolution, 1e-3);
-        let scaled = geometry.theta_scaled(1.0 / lever);
-        let weak = if well_determined(&scaled, config.weak_share) {
-            None
-        } else {
-            let [(least, axis), _, (strongest, _)] = scaled.eigen();
+        let lever = math::max(self.axes.lever * resolution, 1e-3);
+        let weak = self.axes.pairs.and_then(|_| {
+            let [(least, axis), _, (strongest, _)] = geometry.theta_scaled(1.0 / lever).eigen();
             (least < config.weak_share * strongest).then(|| WeakDirection {
                 direction: axis,
                 lever,
                 sigma: sigma / math::sqrt(math::max(least, 1e-3)),
             })
-        };
+        });
         // Along a weak direction nothing is known: 1 m of doubt instead of a singular matrix.
         let floor = if weak.is_some() { 1.0 } else { 0.0 };
         let covariance =
