@@ -1,5 +1,8 @@
 //! Where the robot is by its scans: each matched against a keyframe, with wheel odometry or its own speed as the
 //! guess.
+//!
+//! A scan that becomes the keyframe is first fused with the one before: what stays in sight is known ever better instead
+//! of being measured anew, and the pose drifts by what comes into sight.
 
 mod motion;
 
@@ -42,7 +45,8 @@ pub struct OdometryConfig {
     pub prior_error: f32,
     /// Scans refused one after the other before the keyframe is given up. Default 3.
     pub max_refused: u8,
-    /// The matcher's settings. Default [`IcpConfig::DEFAULT`].
+    /// The matcher's settings. Default [`IcpConfig::DEFAULT`], but a direction is weak below a share of 0.035: along a
+    /// corridor the guess is better than what a few beams tell.
     pub icp: IcpConfig,
 }
 
@@ -59,7 +63,10 @@ impl OdometryConfig {
         max_correction: 0.45,
         prior_error: 0.1,
         max_refused: 3,
-        icp: IcpConfig::DEFAULT,
+        icp: IcpConfig {
+            weak_share: 0.035,
+            ..IcpConfig::DEFAULT
+        },
     };
 }
 
@@ -222,9 +229,16 @@ impl<const N: usize> Odometry<N> {
         let mut outcome = self.matched(predicted.0);
         if rolling.is_some() && score(&outcome) < UNSURE {
             // Wheels that slip tell a wrong motion; to go on as before may then be the better guess.
-            let other = self.matched(self.pose * before.over(times.seconds));
-            if score(&other) > score(&outcome) {
-                outcome = other;
+            let on = self.pose * before.over(times.seconds);
+            let apart = predicted.0.between(on);
+            let most = self.config.max_correction;
+            let likely = apart.distance() < most && math::abs(apart.theta) < 2.0 * most;
+            // A clock whose moments jump tells a wild velocity.
+            if likely {
+                let other = self.matched(on);
+                if score(&other) > score(&outcome) {
+                    outcome = other;
+                }
             }
         }
         self.seen_from = predicted.0;
@@ -241,6 +255,11 @@ impl<const N: usize> Odometry<N> {
         let bend = math::abs(self.motion.twist.omega - before.omega) * times.duration;
         let keyframe = self.wants_keyframe(&outcome, bend);
         if keyframe {
+            if outcome.as_ref().is_ok_and(|found| found.weak.is_none()) {
+                let motion = self.keyframe_pose.between(self.seen_from);
+                let pose = self.config.mount.lidar_motion(motion);
+                icp::fuse(&self.keyframe, self.points.as_mut_slice(), pose);
+            }
             self.keyframe.assign(self.points.as_slice());
             self.keyframe_pose = self.seen_from;
             self.keyframe_covariance = self.covariance;

@@ -13,6 +13,7 @@
 //!
 //! What a pose is worth is judged apart from how it was found (`score`), so that several starts can compete.
 
+mod fusion;
 mod hypotheses;
 mod lines;
 mod pass;
@@ -58,6 +59,9 @@ pub struct IcpConfig {
     pub min_score: f32,
     /// Standard deviation of a range (m): the least noise that the covariance assumes. Default 0.005.
     pub range_sigma: f32,
+    /// A direction is weak that less than this share of the beams tell. Default 0.02: what the noise of the normals alone
+    /// amounts to in a corridor.
+    pub weak_share: f32,
 }
 
 impl IcpConfig {
@@ -68,6 +72,7 @@ impl IcpConfig {
         min_inliers: 30,
         min_score: 0.25,
         range_sigma: 0.005,
+        weak_share: 0.02,
     };
 }
 
@@ -136,6 +141,16 @@ pub fn align_observed<const N: usize>(
     };
     let best = hypotheses::search(&task, &mut observe)?;
     quality::verdict(&task, &best, guess)
+}
+
+/// Moves `points`, seen at `pose` in the reference's frame, towards the surfaces that the reference saw there, if they are
+/// less than 32 mm off: laid as the next reference, they know what this one knew.
+///
+/// For poses of matches without a weak direction: along one, surfaces would be passed on to the wrong place.
+pub fn fuse<const N: usize>(reference: &Reference<N>, points: &mut [ScanPoint], pose: Pose) {
+    if let Some(at) = FixedPose::new(pose) {
+        fusion::fuse(reference.lines(), points, at);
+    }
 }
 
 /// A pass and the step it led to.

@@ -76,6 +76,11 @@ impl<const N: usize> Points<N> {
         &self.points
     }
 
+    /// The points, to be moved.
+    pub(crate) fn as_mut_slice(&mut self) -> &mut [ScanPoint] {
+        &mut self.points
+    }
+
     /// Places hit by `scan`, as seen by the lidar at the scan's last beam if it moves with `twist` (its own, not
     /// the robot's).
     ///

@@ -279,7 +279,7 @@ impl<'a> Projection<'a> {
 }
 
 /// Weighted distance of a point from its line (1/16 mm) and its weight (Q8); `None` beyond the gate or 8 m away.
-fn residual(line: &Line, placed: Placed, gate: u8) -> Option<(i32, i32)> {
+pub(super) fn residual(line: &Line, placed: Placed, gate: u8) -> Option<(i32, i32)> {
     // Below 2¹⁷ the products with 13-bit normals stay in 32 bits.
     const FAR: i32 = 1 << 17;
     let (dx, dy) = (

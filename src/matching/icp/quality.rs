@@ -14,9 +14,6 @@ use crate::{
     math,
 };
 
-/// Share of the weight below which a direction is not determined: 2 of 100 beams, which is what the noise of the
-/// normals alone amounts to in a corridor.
-const WEAK_SHARE: f32 = 0.02;
 /// How much larger errors are than the residuals of one scan say: the reference's noise is as large as the scan's and
 /// averaged over in its lines. Calibrated on simulated and recorded pairs: the mean normalised squared error
 /// of what `pairs --out` writes is near 3 for the former, 3 to 4 for the latter; 3 is ideal.
@@ -52,7 +49,7 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         &h.theta_scaled(1.0 / lever),
         lever,
         noise,
-        sums.total_weight(),
+        config.weak_share * sums.total_weight(),
     )?;
     let step = best.last.length;
     if weak.is_none() && step > TOO_LONG {
@@ -130,14 +127,13 @@ fn without(pose: Pose, other: Pose, [x, y, t]: [f32; 3], lever: f32) -> Pose {
 
 /// The direction that is not determined, if there is one; refuses two.
 ///
-/// `h` is the curvature with headings as long as distances.
+/// `h` is the curvature with headings as long as distances, `threshold` what it must have along a direction.
 fn weak_direction(
     h: &Sym3,
     lever: f32,
     noise: f32,
-    weight: f32,
+    threshold: f32,
 ) -> Result<Option<WeakDirection>, MatchError> {
-    let threshold = WEAK_SHARE * weight;
     // No eigenvalue is smaller than the inverse of the sum of their inverses: most matches need no more.
     if let Some(inverse) = h.inverse()
         && (inverse.xx + inverse.yy + inverse.tt) * threshold < 1.0

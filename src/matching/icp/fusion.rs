@@ -1,0 +1,87 @@
+//! What the reference knew, passed on: so that a chain of keyframes drifts less than its matches are noisy.
+
+use crate::{
+    matching::icp::{
+        pass::{self, FixedPose, Projection},
+        reference::Line,
+    },
+    scan::ScanPoint,
+};
+
+/// Points nearer than this to their line (a gate: 32 mm) saw the same surface again; farther ones saw another.
+const SAME: u8 = 3;
+
+/// Moves points seen from `at` along their beams, three quarters of the way to the lines that they meet: the mean of a
+/// surface as it was known and as it was seen once more.
+pub(super) fn fuse(lines: &[Line], points: &mut [ScanPoint], at: FixedPose) {
+    let mut projection = Projection::new(lines, at);
+    for point in points {
+        let placed = projection.place(point);
+        let Some(line) = projection.line(point, placed) else {
+            continue;
+        };
+        // Weighted, a distance from a line is about that along the beam.
+        let Some((beyond, _)) = pass::residual(line, placed, SAME) else {
+            continue;
+        };
+        let (bx, by) = ((placed.x - at.x) >> 4, (placed.y - at.y) >> 4);
+        let outwards = i32::from(line.mx)
+            .wrapping_mul(bx)
+            .wrapping_add(i32::from(line.my).wrapping_mul(by))
+            >= 0;
+        // From 1/16 mm, and three quarters of it.
+        let by = (3 * beyond + 32) >> 6;
+        let range = i32::from(point.range) - if outwards { by } else { -by };
+        if let Ok(range @ 1..=32_000) = u16::try_from(range) {
+            *point = ScanPoint::at(point.bearing, range);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{geometry::Pose, matching::icp::Reference, scan::Bearing};
+
+    /// What a lidar sees in the middle of a square room, its walls so far away (mm).
+    fn room(wall: f32) -> [ScanPoint; 180] {
+        core::array::from_fn(|k| {
+            let bearing = Bearing((k * 65_536 / 180) as u16);
+            let (s, c) = crate::math::sin_cos(bearing.radians());
+            let ahead = crate::math::max(crate::math::abs(s), crate::math::abs(c));
+            ScanPoint::at(bearing, (wall / ahead) as u16)
+        })
+    }
+
+    #[test]
+    fn points_near_a_known_wall_come_three_quarters_nearer_and_others_stay() {
+        let mut reference = Reference::<180>::new();
+        reference.assign(&room(2000.0));
+        for (wall, expected) in [(2020.0, 2005.0), (1980.0, 1995.0), (2100.0, 2100.0)] {
+            let mut points = room(wall);
+            let at = FixedPose::new(Pose::IDENTITY).expect("near");
+            fuse(reference.lines(), &mut points, at);
+            for point in &points {
+                let distance = f32::from(point.x.unsigned_abs().max(point.y.unsigned_abs()));
+                // In corners lines face the lidar, and less is drawn along the beam.
+                let corner = point.x.unsigned_abs().abs_diff(point.y.unsigned_abs()) < 400;
+                assert!(
+                    corner || (distance - expected).abs() < 4.0,
+                    "{wall}: {point:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_wall_is_met_where_the_pose_puts_it() {
+        let mut reference = Reference::<180>::new();
+        reference.assign(&room(2000.0));
+        // 1 m ahead and turned by half a turn: the wall ahead was behind, 3 m away.
+        let pose = Pose::new(1.0, 0.0, core::f32::consts::PI);
+        let at = FixedPose::new(pose).expect("near");
+        let mut points = [ScanPoint::at(Bearing(0), 3012)];
+        fuse(reference.lines(), &mut points, at);
+        assert!(points[0].range.abs_diff(3003) <= 2, "{points:?}");
+    }
+}
