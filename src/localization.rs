@@ -325,8 +325,8 @@ impl<'a, const N: usize> Localizer<'a, N> {
             max_iterations: 8,
             coarse_stride: 1,
             min_share: 0.1,
-            translation_tolerance: 0.002,
-            rotation_tolerance: 0.001,
+            translation_tolerance: 0.04,
+            rotation_tolerance: 0.02,
             ..self.config.field
         };
         let mut some = heapless::Vec::<ScanPoint, N>::new();

@@ -235,8 +235,8 @@ impl<const N: usize> Search<N> {
             max_iterations: 8,
             coarse_stride: 1,
             min_share: 0.1,
-            translation_tolerance: 0.002,
-            rotation_tolerance: 0.001,
+            translation_tolerance: 0.04,
+            rotation_tolerance: 0.02,
             ..config.field
         };
         let pose = match field::align(pyramid.field(), &self.points, best.pose, &short) {

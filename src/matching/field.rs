@@ -21,9 +21,9 @@ use crate::{
 pub struct FieldConfig {
     /// Most passes over the beams. Default 20.
     pub max_iterations: u8,
-    /// A twentieth of the longest step that may be the last (m). Default 0.0002: a step of 4 mm, of which little is left.
+    /// The longest step that may be the last (m). Default 0.004: it leaves a small part of itself to go.
     pub translation_tolerance: f32,
-    /// And a twentieth of how far it may turn (rad). Default 0.0001.
+    /// And how far it may turn (rad). Default 0.002.
     pub rotation_tolerance: f32,
     /// While far off, every so-many-th beam is enough. Default 4.
     pub coarse_stride: u8,
@@ -45,8 +45,8 @@ impl FieldConfig {
     /// For cells of 5 cm and lidars with 1 cm of noise.
     pub const DEFAULT: Self = Self {
         max_iterations: 20,
-        translation_tolerance: 0.0002,
-        rotation_tolerance: 0.0001,
+        translation_tolerance: 0.004,
+        rotation_tolerance: 0.002,
         coarse_stride: 4,
         inlier_distance: 0.05,
         min_inliers: 20,
@@ -130,15 +130,15 @@ pub fn align<F: Field + ?Sized>(
         };
         if stride > 1 {
             // A quarter of the beams leave the pose twice as uncertain as all: no use in more digits.
-            if small(10.0) || iterations >= config.max_iterations / 2 {
+            if small(0.5) || iterations >= config.max_iterations / 2 {
                 stride = 1;
             }
             continue;
         }
         fine_passes += 1;
-        if curved.is_some() && small(20.0) {
+        if curved.is_some() && small(1.0) {
             break sums;
-        } else if curved.is_none() && small(10.0) {
+        } else if curved.is_none() && small(0.5) {
             curved = Some(sums);
         } else if iterations >= config.max_iterations {
             let step = math::sqrt(square) / per_metre;
