@@ -84,8 +84,8 @@ impl<const N: usize> Points<N> {
     /// Places hit by `scan`, as seen by the lidar at the scan's last beam if it moves with `twist` (its own, not
     /// the robot's).
     ///
-    /// About 40 instructions a beam standing still, 80 in motion on an M4F. Beams without a return or outside
-    /// the configured ranges are left out.
+    /// Beams without a return or outside the configured ranges are left out. A scan taken in motion costs more: each beam
+    /// is turned and moved.
     pub fn assign(&mut self, scan: &Scan<N>, twist: Twist, config: &PointsConfig) {
         self.points.clear();
         let least = millimetres(config.min_range).max(1);

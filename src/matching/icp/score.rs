@@ -35,7 +35,7 @@ const fn agreement() -> [u8; 32] {
     table
 }
 
-/// Judges `at` by every `stride`-th point. About 60 instructions a point on an M4F.
+/// Judges `at` by every `stride`-th point.
 pub(super) fn judge(lines: &[Line], points: &[ScanPoint], at: FixedPose, stride: u16) -> Score {
     let mut projection = Projection::new(lines, at);
     let mut score = Score::default();
