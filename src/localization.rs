@@ -79,6 +79,18 @@ impl LocalizerConfig {
         turn: 0.3,
         field: FieldConfig::DEFAULT,
     };
+
+    /// For candidates, of which most are wrong: a few passes, to a few centimetres.
+    fn short(&self) -> FieldConfig {
+        FieldConfig {
+            max_iterations: 8,
+            coarse_stride: 1,
+            min_share: 0.1,
+            translation_tolerance: 0.04,
+            rotation_tolerance: 0.02,
+            ..self.field
+        }
+    }
 }
 
 impl Default for LocalizerConfig {
@@ -321,14 +333,7 @@ impl<'a, const N: usize> Localizer<'a, N> {
 
     fn choose(&mut self, points: &[ScanPoint], motion: Pose) -> Verdict {
         let field = *self.pyramid.field();
-        let short = FieldConfig {
-            max_iterations: 8,
-            coarse_stride: 1,
-            min_share: 0.1,
-            translation_tolerance: 0.04,
-            rotation_tolerance: 0.02,
-            ..self.config.field
-        };
+        let short = self.config.short();
         let mut some = heapless::Vec::<ScanPoint, N>::new();
         for &point in points.iter().step_by(stride(points.len(), N)) {
             let _ = some.push(point);

@@ -230,11 +230,8 @@ impl<const N: usize> Odometry<N> {
         if rolling.is_some() && score(&outcome) < UNSURE {
             // Wheels that slip tell a wrong motion; to go on as before may then be the better guess.
             let on = self.pose * before.over(times.seconds);
-            let apart = predicted.0.between(on);
-            let most = self.config.max_correction;
-            let likely = apart.distance() < most && math::abs(apart.theta) < 2.0 * most;
             // A clock whose moments jump tells a wild velocity.
-            if likely {
+            if farther(predicted.0, on, self.config.max_correction).is_none() {
                 let other = self.matched(on);
                 if score(&other) > score(&outcome) {
                     outcome = other;
@@ -371,13 +368,11 @@ impl<const N: usize> Odometry<N> {
             &self.config.icp,
         )
         .map_err(Refusal::NoMatch)?;
-        let correction = guess.between(found.pose);
-        let (distance, turn) = (correction.distance(), math::abs(correction.theta));
         let most = self.config.max_correction * found.score;
-        if distance > most || turn > 2.0 * most {
-            return Err(Refusal::TooFar { distance, turn });
+        match farther(guess, found.pose, most) {
+            Some((distance, turn)) => Err(Refusal::TooFar { distance, turn }),
+            None => Ok(found),
         }
-        Ok(found)
     }
 
     /// Pose and covariance of the robot by a match.
@@ -435,6 +430,13 @@ const UNSURE: f32 = 0.6;
 /// How far a match may be trusted: 0 for none.
 fn score(outcome: &Result<Match, Refusal>) -> f32 {
     outcome.as_ref().map_or(0.0, |found| found.score)
+}
+
+/// How far apart two poses are (m, rad), if by more than `most` metres or twice as many radians.
+fn farther(a: Pose, b: Pose, most: f32) -> Option<(f32, f32)> {
+    let off = a.between(b);
+    let (distance, turn) = (off.distance(), math::abs(off.theta));
+    (distance > most || turn > 2.0 * most).then_some((distance, turn))
 }
 
 /// Whether two motions bend a scan differently: by more than 1 cm or 0.3°.

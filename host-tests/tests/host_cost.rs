@@ -4,12 +4,11 @@ mod common;
 
 use std::{
     fs,
-    io::Read as _,
     process::{Command, Stdio},
 };
 
 use common::shared;
-use flate2::read::GzDecoder;
+use host_tests::readers::bytes;
 
 /// Most instructions a match, from the beams of both scans to the pose.
 const ALLOWED: u64 = 300_000;
@@ -33,11 +32,8 @@ fn a_match_of_180_beams_costs_at_most_300_000_instructions() {
         println!("left out: valgrind is not there (Debian: apt-get install valgrind)");
         return;
     }
-    let mut text = String::new();
-    let packed = fs::read(&list).expect("a list of pairs");
-    GzDecoder::new(&packed[..])
-        .read_to_string(&mut text)
-        .expect("packed text");
+    let content = bytes::load(&list).expect("a list of pairs");
+    let text = String::from_utf8(content.bytes).expect("text");
     let rows: Vec<&str> = text
         .lines()
         .enumerate()

@@ -1,10 +1,11 @@
 //! Every lidar on the simulated robot: bytes, driver, odometry, pose.
 
+mod common;
+
 use std::path::Path;
-use std::process::Command;
 
 use beamfix::lidar::Model;
-use serde_json::Value;
+use common::tool::{beamfix, json, text};
 
 /// What each of them may be off after a minute (m, °).
 const ALLOWED: (f64, f64) = (0.05, 1.0);
@@ -18,22 +19,17 @@ fn every_lidar_finds_its_way() {
     let out = std::env::temp_dir().join(format!("beamfix-lidars-{}", std::process::id()));
     let mut too_far = Vec::new();
     for model in Model::ALL {
-        let run = Command::new(env!("CARGO_BIN_EXE_beamfix"))
-            .args([
-                "simulate",
-                "--lidar",
-                model.name,
-                "--seconds",
-                "60",
-                "--json",
-                "--out",
-            ])
-            .arg(&out)
-            .output()
-            .expect("started");
-        let errors = String::from_utf8_lossy(&run.stderr);
-        assert!(run.status.success(), "{}: {errors}", model.name);
-        let report: Value = serde_json::from_slice(&run.stdout).expect("one JSON object");
+        println!("{}", model.name);
+        let report = json(&beamfix(&[
+            "simulate",
+            "--lidar",
+            model.name,
+            "--seconds",
+            "60",
+            "--json",
+            "--out",
+            text(&out),
+        ]));
         let number = |key: &str| report[key].as_f64().expect("number");
         let (metres, degrees) = (number("final_error_m"), number("final_error_deg"));
         println!(
@@ -54,17 +50,6 @@ fn every_lidar_finds_its_way() {
     assert!(too_far.is_empty(), "{too_far:?}");
 }
 
-/// Runs the tool; gives its JSON.
-fn tool(arguments: &[&str]) -> Value {
-    let run = Command::new(env!("CARGO_BIN_EXE_beamfix"))
-        .args(arguments)
-        .output()
-        .expect("started");
-    let errors = String::from_utf8_lossy(&run.stderr);
-    assert!(run.status.success(), "{arguments:?}: {errors}");
-    serde_json::from_slice(&run.stdout).expect("one JSON object")
-}
-
 /// Without the time stamps, of which the sensor's own clock knows another zero.
 fn poses(file: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(file).expect("written");
@@ -80,7 +65,7 @@ fn a_recorded_drive_replays_to_the_same_poses() {
             std::env::temp_dir().join(format!("beamfix-record-{}-{lidar}", std::process::id()));
         let file = |name: &str| out.join(name).to_str().expect("UTF-8").to_owned();
         let (folder, recording, replayed) = (file(""), file("lidar.rec"), file("replayed.txt"));
-        let there = tool(&[
+        let there = json(&beamfix(&[
             "simulate",
             "--lidar",
             lidar,
@@ -89,8 +74,14 @@ fn a_recorded_drive_replays_to_the_same_poses() {
             "--json",
             "--out",
             &folder,
-        ]);
-        let here = tool(&["replay", &recording, "--json", "--trajectory", &replayed]);
+        ]));
+        let here = json(&beamfix(&[
+            "replay",
+            &recording,
+            "--json",
+            "--trajectory",
+            &replayed,
+        ]));
         assert_eq!(here["pose_hash"], there["pose_hash"], "{lidar}");
         assert!(here["scans"].as_u64() > Some(20), "{lidar}");
         assert_eq!(
@@ -99,7 +90,9 @@ fn a_recorded_drive_replays_to_the_same_poses() {
             "{lidar}"
         );
         // The recording names its sensor.
-        let decoded = tool(&["decode", "--lidar", "auto", &recording, "--json"]);
+        let decoded = json(&beamfix(&[
+            "decode", "--lidar", "auto", &recording, "--json",
+        ]));
         assert_eq!(
             (&decoded["lidar"], &decoded["check_errors"]),
             (&lidar.into(), &0.into())

@@ -1,6 +1,7 @@
 //! The simulated drive from ray casting to pose: the same in every run, and right.
 
 use beamfix::geometry::Pose;
+use beamfix::math::wrap_angle;
 use beamfix::odometry::OdometryConfig;
 use beamfix::scan::Mount;
 use host_tests::encoder::ld06::Sensor;
@@ -87,6 +88,47 @@ fn the_drive_through_the_flat_ends_within_3_cm_and_half_a_degree() {
         error.0,
         error.1
     );
+}
+
+/// How far off the odometry is, and how far off it says it may be.
+#[test]
+#[cfg_attr(debug_assertions, ignore = "eight drives of a minute")]
+fn the_pose_is_as_far_off_as_it_says() {
+    let (mut count, mut metres, mut degrees, mut normalised) = (0.0, 0.0, 0.0, 0.0);
+    for seed in 1..=8 {
+        let run = run(seed, 60.0);
+        let (turns, _) = capture::turns("ld06", &run.bytes).expect("an LD06");
+        let mut pipeline = pipeline();
+        let origin = run.moments[turns[0].ends_at - 1].truth;
+        for (number, turn) in turns.iter().enumerate() {
+            let now = run.moments[turn.ends_at - 1];
+            let step = pipeline.step(&turn.beams, Some(now.wheels.into()));
+            // At first there is hardly any error.
+            if number < turns.len() / 2 {
+                continue;
+            }
+            let truth: Pose = origin.between(now.truth).into();
+            let off = [
+                step.pose.x - truth.x,
+                step.pose.y - truth.y,
+                wrap_angle(step.pose.theta - truth.theta),
+            ];
+            let information = step.covariance.information().expect("a covariance").0;
+            let error = score::error(step.pose, truth);
+            count += 1.0;
+            metres += error.0;
+            degrees += error.1;
+            normalised += f64::from(information.quadratic(off));
+        }
+    }
+    let (metres, degrees, normalised) = (metres / count, degrees / count, normalised / count);
+    println!(
+        "second half of 8 drives: {:.2} cm, {degrees:.3}°; normalised squared error {normalised:.2}",
+        100.0 * metres
+    );
+    assert!(metres < 0.02 && degrees < 0.25);
+    // 3 where the covariance says the truth.
+    assert!(normalised > 1.5 && normalised < 5.0);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::{
     geometry::{Point, Pose},
     matching::{
         correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid, rotated::Rotated, stride},
-        field::{self, FieldConfig},
+        field,
     },
     math,
     scan::ScanPoint,
@@ -231,15 +231,7 @@ impl<const N: usize> Search<N> {
         let Ok(best) = correlator.align(&pyramid.local(), &self.points, block, &around) else {
             return;
         };
-        let short = FieldConfig {
-            max_iterations: 8,
-            coarse_stride: 1,
-            min_share: 0.1,
-            translation_tolerance: 0.04,
-            rotation_tolerance: 0.02,
-            ..config.field
-        };
-        let pose = match field::align(pyramid.field(), &self.points, best.pose, &short) {
+        let pose = match field::align(pyramid.field(), &self.points, best.pose, &config.short()) {
             Ok(fine) if alike(fine.pose, best.pose, 0.3, 0.1) => fine.pose,
             _ => best.pose,
         };

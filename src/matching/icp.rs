@@ -146,7 +146,8 @@ pub fn align_observed<const N: usize>(
 /// Moves `points`, seen at `pose` in the reference's frame, towards the surfaces that the reference saw there, if they are
 /// less than 32 mm off: laid as the next reference, they know what this one knew.
 ///
-/// For poses of matches without a weak direction: along one, surfaces would be passed on to the wrong place.
+/// For poses of matches without a weak direction: along one, surfaces would be passed on to the wrong place. Costs a pass
+/// over the points; at a pose that is not finite or more than 27 m away they stay as they are.
 pub fn fuse<const N: usize>(reference: &Reference<N>, points: &mut [ScanPoint], pose: Pose) {
     if let Some(at) = FixedPose::new(pose) {
         fusion::fuse(reference.lines(), points, at);

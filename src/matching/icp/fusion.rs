@@ -5,7 +5,7 @@ use crate::{
         pass::{self, FixedPose, Projection},
         reference::Line,
     },
-    scan::ScanPoint,
+    scan::{Points, ScanPoint},
 };
 
 /// Points nearer than this to their line (a gate: 32 mm) saw the same surface again; farther ones saw another.
@@ -25,15 +25,12 @@ pub(super) fn fuse(lines: &[Line], points: &mut [ScanPoint], at: FixedPose) {
             continue;
         };
         let (bx, by) = ((placed.x - at.x) >> 4, (placed.y - at.y) >> 4);
-        let outwards = i32::from(line.mx)
-            .wrapping_mul(bx)
-            .wrapping_add(i32::from(line.my).wrapping_mul(by))
-            >= 0;
+        let outwards = i32::from(line.mx) * bx + i32::from(line.my) * by >= 0;
         // From 1/16 mm, and three quarters of it.
-        let by = (3 * beyond + 32) >> 6;
-        let range = i32::from(point.range) - if outwards { by } else { -by };
-        if let Ok(range @ 1..=32_000) = u16::try_from(range) {
-            *point = ScanPoint::at(point.bearing, range);
+        let nearer = (3 * beyond + 32) >> 6;
+        let range = i32::from(point.range) - if outwards { nearer } else { -nearer };
+        if (1..=i32::from(Points::<0>::MAX_RANGE_MM)).contains(&range) {
+            *point = ScanPoint::at(point.bearing, range as u16);
         }
     }
 }
