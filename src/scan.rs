@@ -73,6 +73,11 @@ impl<const N: usize> Scan<N> {
         Ok(())
     }
 
+    /// Whether a beam of this time (µs) is less than 1.04 s younger than the first, or the first itself.
+    pub(crate) fn reaches(&self, time_us: u32) -> bool {
+        self.is_empty() || time_us.wrapping_sub(self.start_us) >> 4 <= 0xffff
+    }
+
     /// Number of beams, with or without a return.
     #[must_use]
     pub fn len(&self) -> usize {

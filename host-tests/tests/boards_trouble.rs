@@ -5,6 +5,8 @@
 //! no limit is on how long things take. What the watchdog does is tried with the Pico's own firmware in rp2040js, where time
 //! is simulated too.
 
+mod common;
+
 use std::{
     io::Write as _,
     thread,
@@ -13,10 +15,10 @@ use std::{
 
 use beamfix::lidar::ld06::{FRAME, check_code};
 use beamfix_app::{
-    demo::Demo,
     link::Receiver,
     telemetry::{Health, LidarState, MotorState, Pose, Reset, Telemetry},
 };
+use common::cable::{Cable, PACKET_US};
 use host_tests::board::{
     BOARDS,
     recording::Recording,
@@ -26,8 +28,6 @@ use host_tests::board::{
 
 /// Longest that anything may take; a tenth of it does on an idle machine.
 const PATIENCE: Duration = Duration::from_secs(90);
-/// Time between two packets (µs).
-const PACKET_US: u64 = 12 * 222;
 
 /// What the lidar does.
 #[derive(Clone, Copy, PartialEq)]
@@ -44,11 +44,8 @@ enum Lidar {
 struct Robot {
     board: Stream,
     receiver: Receiver,
-    demo: Demo,
+    cable: Cable,
     lidar: Lidar,
-    /// The lidar's clock now counts from here (ms): it starts over when it gets power again.
-    clock_ms: u64,
-    packets: u64,
     due: Instant,
     asked: Instant,
     readies: Vec<Reset>,
@@ -64,10 +61,8 @@ impl Robot {
         let mut robot = Self {
             board,
             receiver: Receiver::new(),
-            demo: Demo::new(),
+            cable: Cable::new(),
             lidar: Lidar::Unplugged,
-            clock_ms: 0,
-            packets: 0,
             due: now,
             asked: now,
             readies: Vec::new(),
@@ -83,24 +78,14 @@ impl Robot {
     fn lidar(&mut self, does: Lidar) {
         if self.lidar == Lidar::Turns && does == Lidar::Unplugged {
             // In the middle of a packet.
-            let half = self.packet();
+            let half = self.cable.packet();
             self.send(&half[..FRAME / 2]);
         }
         if self.lidar == Lidar::Unplugged {
-            self.clock_ms = self.packets * PACKET_US / 1000;
+            self.cable.has_power_again();
         }
         self.lidar = does;
         self.due = Instant::now();
-    }
-
-    /// The simulated lidar's next packet, by the clock of the one that is connected.
-    fn packet(&mut self) -> [u8; FRAME] {
-        let mut packet = self.demo.packet();
-        let ms = (self.packets * PACKET_US / 1000 - self.clock_ms) % 30_000;
-        self.packets += 1;
-        packet[44..46].copy_from_slice(&(ms as u16).to_le_bytes());
-        packet[46] = check_code(&packet[..46]);
-        packet
     }
 
     fn send(&mut self, bytes: &[u8]) {
@@ -124,8 +109,8 @@ impl Robot {
             let is_due = Instant::now() >= self.due;
             if self.lidar != Lidar::Unplugged && is_due {
                 let packet = match self.lidar {
-                    Lidar::Held => held(self.packet()),
-                    _ => self.packet(),
+                    Lidar::Held => held(self.cable.packet()),
+                    _ => self.cable.packet(),
                 };
                 self.send(&packet);
                 self.due += Duration::from_micros(PACKET_US);
@@ -173,21 +158,12 @@ impl Robot {
         health.expect("it was there")
     }
 
-    /// The last pose is where the robot is. Within 30 s of the lidar's start: then its clock wraps.
+    /// The last pose is where the robot is.
     fn is_where_it_should_be(&mut self) {
         let pose = self.poses.last().expect("a pose");
-        let since_start_us = u64::from(pose.time_us) % 30_000_000;
-        let truth = self
-            .demo
-            .truth((1000 * self.clock_ms + since_start_us) as u32);
-        let [x, y, theta] = pose.pose;
-        let off = truth.between(beamfix::geometry::Pose { x, y, theta });
-        let (mm, degrees) = (1000.0 * off.distance(), off.theta.to_degrees());
+        let (mm, degrees) = self.cable.off(pose);
         println!("{mm:.0} mm and {degrees:.2}° off");
-        assert!(
-            mm < 50.0 && degrees.abs() < 1.5,
-            "{pose:?}, really {truth:?}"
-        );
+        assert!(mm < 50.0 && degrees.abs() < 1.5, "{pose:?}");
     }
 
     /// The numbers of all poses since the last start: none is missing.
@@ -213,8 +189,7 @@ fn driving() -> Robot {
     robot.lidar(Lidar::Turns);
     // Where its first pose was is where it measures from.
     robot.until("a first pose", |robot| !robot.poses.is_empty());
-    let first = robot.poses[0].time_us;
-    let _ = robot.demo.truth(first);
+    robot.cable.first(&robot.poses[0]);
     robot.poses(20);
     let health = robot.until_health("all is well", |health| {
         (health.lidar, health.motor) == (LidarState::Turning, MotorState::Steady)

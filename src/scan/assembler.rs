@@ -6,7 +6,9 @@ use super::{Beam, Bearing, Scan};
 ///
 /// Each beam keeps its own bearing, range and time; nothing is binned. 8·N + 64 bytes: one scan, and the one beam
 /// that is already the next turn's when a turn is complete.
-/// A turn whose start was lost on the line ends by itself ([`TurnStarts`]).
+/// A turn whose start was lost on the line ends by itself ([`TurnStarts`]). One whose beams are more than 1.04 s apart was
+/// interrupted, by a cable or a motor: the robot is elsewhere by now, so these beams are refused, and the next whole turn
+/// is the first one reported.
 ///
 /// ```
 /// # use beamfix::scan::{Assembler, Beam, Bearing, Range};
@@ -94,16 +96,16 @@ impl<const N: usize> Assembler<N> {
     /// `turn_starts` says that this beam is the first of a turn. The scan stays until the next push.
     pub fn push(&mut self, beam: Beam, turn_starts: bool) -> bool {
         let turn_starts = self.starts.push(beam.bearing, turn_starts);
+        if let State::Ready(first) = self.state {
+            self.scan.clear();
+            self.keep(first);
+            self.state = State::Whole;
+        }
+        if matches!(self.state, State::Whole) && !turn_starts && !self.scan.reaches(beam.time_us) {
+            self.refused = self.refused.wrapping_add(self.scan.len() as u32);
+            self.restart();
+        }
         match self.state {
-            State::Ready(first) => {
-                self.scan.clear();
-                self.keep(first);
-                self.state = State::Whole;
-                if turn_starts {
-                    self.state = State::Ready(beam);
-                    return true;
-                }
-            }
             State::Whole if turn_starts => {
                 self.state = State::Ready(beam);
                 return true;
@@ -113,7 +115,7 @@ impl<const N: usize> Assembler<N> {
                 self.state = State::Whole;
             }
             State::Partial => return false,
-            State::Whole => {}
+            State::Whole | State::Ready(_) => {}
         }
         self.keep(beam);
         false
@@ -125,7 +127,7 @@ impl<const N: usize> Assembler<N> {
         &self.scan
     }
 
-    /// Beams that found no room because a turn had more than N; wraps.
+    /// Beams that found no room because a turn had more than N, and what there was of interrupted turns; wraps.
     #[must_use]
     pub fn refused_beams(&self) -> u32 {
         self.refused
@@ -135,6 +137,7 @@ impl<const N: usize> Assembler<N> {
     pub fn restart(&mut self) {
         self.scan.clear();
         self.state = State::Partial;
+        self.starts = TurnStarts::new();
     }
 
     fn keep(&mut self, beam: Beam) {
@@ -208,6 +211,38 @@ mod tests {
             }
         }
         assert_eq!((turns, assembler.refused_beams()), (2, 12));
+    }
+
+    #[test]
+    fn an_interrupted_turn_is_refused() {
+        // Eight beams a turn, 160 µs apart; none came for a while after beam `last`.
+        for (pause_us, last, lengths, refused) in [
+            (1_040_000, 11, [8, 8, 8].as_slice(), 0),
+            (1_060_000, 11, &[8, 8], 4),
+            // Between two turns, and after the first beam of one.
+            (1_060_000, 15, &[8, 8, 8], 0),
+            (1_060_000, 16, &[8, 8], 1),
+            // Back to an earlier time: the clock started over.
+            (0u32.wrapping_sub(2000), 11, &[8, 8], 4),
+        ] {
+            let mut assembler = Assembler::<8>::new();
+            let mut got = heapless::Vec::<_, 4>::new();
+            for k in 0..32 {
+                let mut beam = beam(k);
+                if k > last {
+                    beam.time_us = beam.time_us.wrapping_add(pause_us);
+                }
+                if assembler.push(beam, k % 8 == 0) {
+                    got.push(assembler.scan().len()).expect("room");
+                    assert!(assembler.scan().duration() < 1.06);
+                }
+            }
+            assert_eq!(
+                (got.as_slice(), assembler.refused_beams()),
+                (lengths, refused),
+                "{pause_us} after {last}"
+            );
+        }
     }
 
     #[test]
