@@ -43,7 +43,8 @@ pub struct OdometryConfig {
     pub max_correction: f32,
     /// Error of the guess, as a share of the distance and of the turn. Default 0.1.
     pub prior_error: f32,
-    /// Scans refused one after the other before the keyframe is given up. Default 3.
+    /// Scans refused one after the other before the keyframe is given up. Default 10: who stands before the lidar for
+    /// less than a second costs nothing.
     pub max_refused: u8,
     /// The matcher's settings. Default [`IcpConfig::DEFAULT`], but a direction is weak below a share of 0.035: along a
     /// corridor the guess is better than what a few beams tell.
@@ -62,7 +63,7 @@ impl OdometryConfig {
         keyframe_overlap: 0.6,
         max_correction: 0.45,
         prior_error: 0.1,
-        max_refused: 3,
+        max_refused: 10,
         icp: IcpConfig {
             weak_share: 0.035,
             ..IcpConfig::DEFAULT
@@ -211,14 +212,17 @@ impl<const N: usize> Odometry<N> {
 
     /// Takes a scan in and says where the robot is.
     ///
-    /// `wheels` is the robot's pose by its wheels at the scan's end, in any fixed frame; `None` means that the last
-    /// velocity goes on. A scan without a usable match leaves the guess as the pose, is counted, and says why.
+    /// `wheels` is the robot's pose by its wheels at the scan's end, in any fixed frame. `None`: the last velocity is
+    /// believed to go on; where that leads to no good match, the robot may also stand, or turn more or less.
+    /// A scan without a usable match leaves the guess as the pose, is counted, and says why.
+    ///
+    /// Costs a match or two, three with wheels that slip, and up to seven without wheels.
     pub fn update(&mut self, scan: &Scan<N>, wheels: Option<Pose>) -> Step {
         let times = self.times(scan);
         let rolled = self.rolled(wheels);
         let rolling = rolled.map(|motion| Twist::from_motion(motion, times.seconds));
         let before = self.motion.twist;
-        let expected = rolling.unwrap_or(before);
+        let mut expected = rolling.unwrap_or(before);
         let motion = match rolled {
             // Without a clock there is no velocity, but the wheels still tell how far.
             Some(motion) if times.seconds == 0.0 => motion,
@@ -227,23 +231,24 @@ impl<const N: usize> Odometry<N> {
         let predicted = (self.pose * motion, self.grown(motion));
         self.see(scan, expected);
         let mut outcome = self.matched(predicted.0);
-        if rolling.is_some() && score(&outcome) < UNSURE {
-            // Wheels that slip tell a wrong motion; to go on as before may then be the better guess.
-            let on = self.pose * before.over(times.seconds);
-            // A clock whose moments jump tells a wild velocity.
-            if farther(predicted.0, on, self.config.max_correction).is_none() {
-                let other = self.matched(on);
-                if score(&other) > score(&outcome) {
-                    outcome = other;
-                }
+        if score(&outcome) < UNSURE
+            && let Some(guess) = self.other_guess(predicted.0, rolling, times)
+        {
+            let other = self.matched(guess);
+            if score(&other) > score(&outcome) {
+                outcome = other;
             }
+        }
+        if score(&outcome) < UNSURE
+            && rolling.is_none()
+            && times.duration > 0.0
+            && self.refused_in_a_row < BLIND
+        {
+            expected = self.seen_otherwise(scan, times, &mut outcome);
         }
         self.seen_from = predicted.0;
         (self.pose, self.covariance) = match &mut outcome {
-            Ok(found) => {
-                self.refused_in_a_row = 0;
-                self.unbent(scan, found, expected, rolling, times)
-            }
+            Ok(found) => self.unbent(scan, found, expected, rolling, times),
             Err(_) => {
                 self.motion.advance(predicted.0, expected, rolling, times);
                 predicted
@@ -273,6 +278,60 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
+    /// Where the robot may be if not where it is predicted.
+    fn other_guess(&self, predicted: Pose, rolling: Option<Twist>, times: Times) -> Option<Pose> {
+        if rolling.is_none() {
+            // It has stopped, or its velocity was wrong.
+            return Some(self.pose);
+        }
+        // Wheels that slip tell a wrong motion; but a clock whose moments jump tells a wild velocity.
+        let on = self.pose * self.motion.twist.over(times.seconds);
+        let wild = farther(predicted, on, self.config.max_correction).is_some();
+        (!wild).then_some(on)
+    }
+
+    /// Matches a scan as if the robot had turned otherwise than in the last one, or stood, until one match is sure; gives the
+    /// best one's motion, which has bent the points back.
+    ///
+    /// Without wheels nothing foretells a hard turn, and a scan that it bent fits nowhere.
+    fn seen_otherwise(
+        &mut self,
+        scan: &Scan<N>,
+        times: Times,
+        outcome: &mut Result<Match, Refusal>,
+    ) -> Twist {
+        /// How much a turn quickens or slows (rad/s²); a nimble robot's by twice that.
+        const QUICKENS: f32 = 4.0;
+        let expected = self.motion.twist;
+        let quicker = |by: f32| Twist {
+            omega: expected.omega + by * QUICKENS * times.duration,
+            ..expected
+        };
+        let (mut best, mut seen) = (expected, expected);
+        for twist in [
+            quicker(1.0),
+            quicker(-1.0),
+            quicker(2.0),
+            quicker(-2.0),
+            Twist::ZERO,
+        ] {
+            self.see(scan, twist);
+            seen = twist;
+            let other = self.matched(self.pose * twist.over(times.seconds));
+            if score(&other) > score(outcome) {
+                *outcome = other;
+                best = twist;
+            }
+            if score(outcome) > UNSURE {
+                break;
+            }
+        }
+        if seen != best {
+            self.see(scan, best);
+        }
+        best
+    }
+
     /// Robot at the scan's end by a match of the scan as `expected` bent it back; where the robot moved otherwise, the
     /// scan is bent back by that and matched once more.
     fn unbent(
@@ -287,7 +346,14 @@ impl<const N: usize> Odometry<N> {
         let (end, mut covariance) = self.placed(found);
         self.seen_from = end;
         let mut middle = end * expected.over(back);
-        let during = self.motion.during(middle, rolling, times);
+        let sudden = self.refused_in_a_row > 0 || expected != self.motion.twist;
+        let during = if rolling.is_none() && sudden {
+            // From the last scan's middle no velocity can be measured: that one's place was only a guess, or the velocity
+            // has changed since, as the scan itself tells better.
+            expected
+        } else {
+            self.motion.during(middle, rolling, times)
+        };
         if differs(expected.over(times.duration), during.over(times.duration)) {
             self.see(scan, during);
             self.seen_from = middle * during.over(-back);
@@ -415,7 +481,10 @@ impl<const N: usize> Odometry<N> {
                 let moved = self.keyframe_pose.between(self.pose);
                 let met = f32::from(found.overlap) / f32::from(found.beams.max(1));
                 let near = if bend > BENT { 0.5 } else { 1.0 };
-                enough
+                // The first match after refused ones may be wrong, which the next ones tell as long as the keyframe is there.
+                let refused = core::mem::take(&mut self.refused_in_a_row);
+                refused == 0
+                    && enough
                     && (near * moved.distance() > self.config.keyframe_distance
                         || near * math::abs(moved.theta) > self.config.keyframe_turn
                         || met < self.config.keyframe_overlap)
@@ -426,6 +495,9 @@ impl<const N: usize> Odometry<N> {
 
 /// A match that explains less than this share of the beams is tried again from another guess.
 const UNSURE: f32 = 0.6;
+
+/// After so many refused scans in a row it is no sudden turn by which they fit nowhere.
+const BLIND: u8 = 3;
 
 /// How far a match may be trusted: 0 for none.
 fn score(outcome: &Result<Match, Refusal>) -> f32 {

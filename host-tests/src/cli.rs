@@ -8,6 +8,7 @@ mod learn;
 mod localize;
 mod output;
 mod pairs;
+mod prior;
 mod replay;
 mod simulate;
 mod track;

@@ -76,10 +76,10 @@ fn near_errors(mut track: Vec<Placed>, relations: &Path) -> (f64, f64, usize) {
 
 #[test]
 fn drift_over_recorded_logs_stays_below_what_was_asked_for() {
-    //   log      scans   near relations  allowed (m, degrees)
-    for (name, scans, relations, allowed) in [
-        ("intel", 13_631, 1770, (0.016, 0.25)),
-        ("fr079", 4934, 987, (0.030, 0.45)),
+    //   log      scans   near relations  allowed (m, degrees) with wheels and without
+    for (name, scans, relations, with_wheels, without) in [
+        ("intel", 13_631, 1770, (0.016, 0.25), (0.025, 0.25)),
+        ("fr079", 4934, 987, (0.030, 0.45), (0.030, 0.45)),
     ] {
         let Some(path) = shared::file(&format!("datasets/logs/{name}.log.gz")) else {
             continue;
@@ -90,15 +90,19 @@ fn drift_over_recorded_logs_stays_below_what_was_asked_for() {
             (scans, 0, true),
             "{name}"
         );
-        let (track, refused) = track(&log, true);
-        let (metres, degrees, used) =
-            near_errors(track, &path.with_file_name(format!("{name}.relations")));
-        println!("{name}: {used} relations, {metres:.4} m, {degrees:.3}°, {refused} scans refused");
-        assert_eq!(used, relations, "{name}");
-        assert!(
-            metres <= allowed.0 && degrees <= allowed.1,
-            "{name}: {metres} m, {degrees}°, allowed {allowed:?}"
-        );
+        for (wheels, allowed) in [(true, with_wheels), (false, without)] {
+            let (track, refused) = track(&log, wheels);
+            let (metres, degrees, used) =
+                near_errors(track, &path.with_file_name(format!("{name}.relations")));
+            println!(
+                "{name}, wheels {wheels}: {used} relations, {metres:.4} m, {degrees:.3}°, {refused} scans refused"
+            );
+            assert_eq!(used, relations, "{name}");
+            assert!(
+                metres <= allowed.0 && degrees <= allowed.1,
+                "{name}, wheels {wheels}: {metres} m, {degrees}°, allowed {allowed:?}"
+            );
+        }
     }
 }
 

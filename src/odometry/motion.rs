@@ -29,6 +29,8 @@ pub(super) struct Motion {
     rolling: Twist,
     /// From its first beam to its last (s).
     duration: f32,
+    /// From scan to scan, about (s).
+    usual: f32,
 }
 
 impl Motion {
@@ -38,6 +40,7 @@ impl Motion {
         middle: Pose::IDENTITY,
         rolling: Twist::ZERO,
         duration: 0.0,
+        usual: 0.0,
     };
 
     /// Velocity during a scan whose middle was found at `middle`: that of the wheels and of what they missed on the
@@ -57,6 +60,13 @@ impl Motion {
         if rolling.is_some() && missed.distance() < SLIP.0 && math::abs(missed.theta) < SLIP.1 {
             return by_wheels;
         }
+        // A clock whose moments jump makes a velocity of any size. That of wheels says how far within the same time.
+        let least = 0.5 * self.usual;
+        let between = if rolling.is_none() && between < least {
+            least
+        } else {
+            between
+        };
         let missed = Twist::from_motion(missed, between);
         Twist {
             vx: by_wheels.vx + missed.vx,
@@ -70,6 +80,7 @@ impl Motion {
         self.middle = end * twist.over(-0.5 * times.duration);
         self.rolling = rolling.unwrap_or(Twist::ZERO);
         self.duration = times.duration;
+        self.usual += 0.1 * (times.seconds - self.usual);
         self.twist = twist;
     }
 }
@@ -120,6 +131,24 @@ mod tests {
             let off = [twist.vx - 0.6, twist.vy, twist.omega + 1.1];
             // What wheels and slip turn within one scan is added, not composed: a fifteenth of the slip.
             assert!(off.iter().all(|v| v.abs() < 0.02), "{wheels:?}: {twist:?}");
+        }
+    }
+
+    #[test]
+    fn a_clock_whose_moments_jump_makes_no_wild_velocity() {
+        let mut motion = Motion::STANDING;
+        let (mut end, step) = (Pose::IDENTITY, Pose::new(0.05, 0.0, 0.0));
+        for k in 0..40 {
+            let seconds = if k % 4 == 3 { 0.001 } else { 0.133 };
+            let times = Times {
+                seconds,
+                duration: 0.0,
+            };
+            end = end * step;
+            let during = motion.during(end, None, times);
+            // 0.5 m/s; without the bound 50 m/s.
+            assert!(k < 20 || during.vx < 1.1, "{during:?}");
+            motion.advance(end, during, None, times);
         }
     }
 

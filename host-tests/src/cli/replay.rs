@@ -19,6 +19,7 @@ use serde_json::json;
 
 use super::localize::replay as localize_replay;
 use super::output;
+use super::prior::Prior;
 use super::track::{At, Track};
 
 /// Run the firmware's pipeline over a recorded log: CARMEN .log, .lscan, ROS 2 MCAP, a recording of
@@ -67,12 +68,6 @@ enum Mode {
     #[value(hide = true)]
     Slam,
     Localize,
-}
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Prior {
-    Odometry,
-    None,
 }
 
 /// Compiled memory configurations, by the RAM of the controller: how many beams a turn may have.
@@ -215,7 +210,7 @@ fn replay<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
     );
     let start = log.scans.first().and_then(|scan| scan.wheels);
     for scan in &log.scans[..count] {
-        let wheels = scan.wheels.filter(|_| args.prior == Prior::Odometry);
+        let wheels = args.prior.of(scan.wheels);
         last = pipeline.step(&scan.beams, wheels).pose;
         if let Some(file) = &mut trajectory {
             writeln!(file, "{} {} {} {}", scan.stamp, last.x, last.y, last.theta)?;

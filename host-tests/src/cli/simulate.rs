@@ -23,6 +23,7 @@ use host_tests::{encoder, size, sized};
 use serde_json::json;
 
 use super::output;
+use super::prior::Prior;
 use super::track::{At, Track};
 
 /// Drive a simulated robot through a flat: ray casting, lidar bytes, driver, matcher, pose.
@@ -37,6 +38,9 @@ pub struct Args {
     /// The lidar on board.
     #[arg(long, value_name = "MODEL", default_value = "ld06")]
     lidar: String,
+    /// Where the guess for each match comes from: the simulated wheels' odometry, or the last velocity.
+    #[arg(long, value_enum, default_value_t = Prior::Odometry)]
+    prior: Prior,
     /// Stop after so many seconds; the round takes about 70.
     #[arg(long, default_value_t = Settings::DEFAULT.seconds)]
     seconds: f64,
@@ -161,7 +165,7 @@ fn follow<const N: usize>(
         let Some(now) = moment(&drive, turn) else {
             break;
         };
-        let step = pipeline.step(&turn.beams, Some(now.wheels.into()));
+        let step = pipeline.step(&turn.beams, args.prior.of(Some(now.wheels.into())));
         let true_pose: Pose = origin.truth.between(now.truth).into();
         let wheels: Pose = origin.wheels.between(now.wheels).into();
         let at = At {
