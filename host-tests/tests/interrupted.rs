@@ -15,7 +15,7 @@ use host_tests::board::Here;
 /// Packets of a turn of the lidar, nearly.
 const TURN: u64 = 38;
 
-/// What happens while no bytes come.
+/// What happens meanwhile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Meanwhile {
     /// The robot stands, and the lidar's clock starts over.
@@ -87,7 +87,7 @@ impl Robot {
         }
     }
 
-    /// Three seconds later.
+    /// By its last pose.
     fn is_where_it_should_be(&mut self) -> bool {
         let (mm, degrees) = self.cable.off(self.poses.last().expect("a pose"));
         mm < 20.0 && degrees.abs() < 0.3
@@ -110,6 +110,7 @@ fn tried(after: u64, ms: u64, meanwhile: Meanwhile) {
         let mut robot = Robot::new();
         robot.drives(packets);
         robot.is_interrupted(1000 * ms / PACKET_US, meanwhile);
+        // Three seconds more.
         robot.drives(30 * TURN);
         if !robot.is_where_it_should_be() {
             astray.push(packets);
