@@ -216,7 +216,7 @@ impl<const N: usize> Odometry<N> {
     /// believed to go on; where that leads to no good match, the robot may also stand, or turn more or less.
     /// A scan without a usable match leaves the guess as the pose, is counted, and says why.
     ///
-    /// Costs a match or two, three with wheels that slip, and up to seven without wheels.
+    /// Costs a match or two, three with wheels that slip, and up to six without wheels.
     pub fn update(&mut self, scan: &Scan<N>, wheels: Option<Pose>) -> Step {
         let times = self.times(scan);
         let rolled = self.rolled(wheels);
@@ -242,7 +242,7 @@ impl<const N: usize> Odometry<N> {
         if score(&outcome) < UNSURE
             && rolling.is_none()
             && times.duration > 0.0
-            && self.refused_in_a_row < BLIND
+            && self.refused_in_a_row == 0
         {
             expected = self.seen_otherwise(scan, times, &mut outcome);
         }
@@ -290,8 +290,8 @@ impl<const N: usize> Odometry<N> {
         (!wild).then_some(on)
     }
 
-    /// Matches a scan as if the robot had turned otherwise than in the last one, or stood, until one match is sure; gives the
-    /// best one's motion, which has bent the points back.
+    /// Matches a scan as if the robot had turned otherwise than in the last one, until one match is sure; gives the best one's
+    /// motion, which has bent the points back.
     ///
     /// Without wheels nothing foretells a hard turn, and a scan that it bent fits nowhere.
     fn seen_otherwise(
@@ -308,13 +308,7 @@ impl<const N: usize> Odometry<N> {
             ..expected
         };
         let (mut best, mut seen) = (expected, expected);
-        for twist in [
-            quicker(1.0),
-            quicker(-1.0),
-            quicker(2.0),
-            quicker(-2.0),
-            Twist::ZERO,
-        ] {
+        for twist in [quicker(1.0), quicker(-1.0), quicker(2.0), quicker(-2.0)] {
             self.see(scan, twist);
             seen = twist;
             let other = self.matched(self.pose * twist.over(times.seconds));
@@ -495,9 +489,6 @@ impl<const N: usize> Odometry<N> {
 
 /// A match that explains less than this share of the beams is tried again from another guess.
 const UNSURE: f32 = 0.6;
-
-/// After so many refused scans in a row it is no sudden turn by which they fit nowhere.
-const BLIND: u8 = 3;
 
 /// How far a match may be trusted: 0 for none.
 fn score(outcome: &Result<Match, Refusal>) -> f32 {
