@@ -216,7 +216,7 @@ impl<const N: usize> Odometry<N> {
     /// believed to go on; where that leads to no good match, the robot may also stand, or turn more or less.
     /// A scan without a usable match leaves the guess as the pose, is counted, and says why.
     ///
-    /// Costs a match or two, three with wheels that slip, and up to six without wheels.
+    /// Costs a match or two, three with wheels that slip, and up to seven without wheels.
     pub fn update(&mut self, scan: &Scan<N>, wheels: Option<Pose>) -> Step {
         let times = self.times(scan);
         let rolled = self.rolled(wheels);
@@ -290,8 +290,8 @@ impl<const N: usize> Odometry<N> {
         (!wild).then_some(on)
     }
 
-    /// Matches a scan as if the robot had turned otherwise than in the last one, until one match is sure; gives the best one's
-    /// motion, which has bent the points back.
+    /// Matches a scan as if the robot had turned otherwise than in the last one, until one match is sure; gives the best
+    /// one's motion, which has bent the points back.
     ///
     /// Without wheels nothing foretells a hard turn, and a scan that it bent fits nowhere.
     fn seen_otherwise(

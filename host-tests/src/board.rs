@@ -208,6 +208,18 @@ impl Replay {
             _ => None,
         })
     }
+
+    /// The last word on the application's health.
+    #[must_use]
+    pub fn health(&self) -> Option<&Health> {
+        self.messages
+            .iter()
+            .rev()
+            .find_map(|message| match message {
+                Telemetry::Health(health) => Some(health),
+                _ => None,
+            })
+    }
 }
 
 /// The first pose in which two runs differ, in words; `None` where every bit of every pose is the same.

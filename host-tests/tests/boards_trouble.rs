@@ -25,6 +25,7 @@ use host_tests::board::{
     rp2040js::{Job, PICO, Report},
     stream::Stream,
 };
+use host_tests::sim::noise::Noise;
 
 /// Longest that anything may take; a tenth of it does on an idle machine.
 const PATIENCE: Duration = Duration::from_secs(90);
@@ -300,8 +301,8 @@ fn in_rp2040js(job: Job) -> Option<Report> {
 )]
 fn bytes_that_lead_nowhere_end_in_a_reset_by_the_watchdog() {
     // Another lidar's bytes, or a bad line, for 20 s.
-    let mut random = random();
-    let noise: Vec<u8> = std::iter::repeat_with(|| (random() >> 8) as u8)
+    let mut random = Noise::new(1, 0);
+    let noise: Vec<u8> = std::iter::repeat_with(|| random.even(0.0, 256.0) as u8)
         .take(20 * 23_040)
         .collect();
     let Some(report) = in_rp2040js(Job::ld06(PICO, &noise)) else {
@@ -313,30 +314,22 @@ fn bytes_that_lead_nowhere_end_in_a_reset_by_the_watchdog() {
     assert!((15.5..16.5).contains(&reset), "{reset}");
 }
 
-/// Numbers without a pattern.
-fn random() -> impl FnMut() -> u32 {
-    let mut state = 1u32;
-    move || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        state >> 16
-    }
-}
-
 #[test]
 #[cfg_attr(
     debug_assertions,
     ignore = "once is enough: the firmware is always a release build"
 )]
 fn scans_that_fit_nowhere_cost_a_pico_a_few_packets_at_most() {
-    // Without wheels the first such scan costs most: other turns are tried, longer than the ring for bytes lasts. Three ranges in four are wrong for 0.8 s of 7.
-    let (mut cable, mut random, mut bytes) = (Cable::new(), random(), Vec::new());
+    // Without wheels the first such scan costs most: other turns are tried, longer than the ring for bytes lasts.
+    // Three ranges in four are wrong for 0.8 s of 7.
+    let (mut cable, mut random, mut bytes) = (Cable::new(), Noise::new(1, 0), Vec::new());
     for k in 0..2600 {
         let mut packet = cable.packet();
         if (1200..1500).contains(&k) {
             for point in packet[6..42].chunks_exact_mut(3) {
-                let (wrong, mm) = (random(), 200 + random() % 3000);
-                if !wrong.is_multiple_of(4) {
-                    point[..2].copy_from_slice(&(mm as u16).to_le_bytes());
+                if random.even(0.0, 1.0) < 0.75 {
+                    let mm = random.even(200.0, 3200.0) as u16;
+                    point[..2].copy_from_slice(&mm.to_le_bytes());
                 }
             }
             packet[46] = check_code(&packet[..46]);
@@ -349,14 +342,7 @@ fn scans_that_fit_nowhere_cost_a_pico_a_few_packets_at_most() {
     let poses: Vec<_> = report.replay.poses().collect();
     cable.first(poses[0]);
     let (mm, degrees) = cable.off(poses[poses.len() - 1]);
-    let health = report.replay.messages.iter().rev().find_map(|message| {
-        if let Telemetry::Health(health) = message {
-            Some(health)
-        } else {
-            None
-        }
-    });
-    let health = health.expect("every 16 poses");
+    let health = report.replay.health().expect("every 16 poses");
     println!(
         "{} poses, the last {mm:.0} mm and {degrees:.2}° off; {health:?}",
         poses.len()

@@ -158,15 +158,7 @@ fn a_pico_counts_and_survives_forced_overruns() {
         return;
     };
     let poses: Vec<_> = report.replay.poses().collect();
-    let health = report
-        .replay
-        .messages
-        .iter()
-        .rev()
-        .find_map(|message| match message {
-            Telemetry::Health(health) => Some(health),
-            _ => None,
-        });
+    let health = report.replay.health();
     let health = health.expect("a health message every 16 revolutions");
     println!(
         "{} bytes lost in {} poses, {health:?}",

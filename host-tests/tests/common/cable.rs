@@ -28,11 +28,6 @@ impl Cable {
         }
     }
 
-    /// Packets taken so far.
-    pub fn packets(&self) -> u64 {
-        self.packets
-    }
-
     /// The next packet, by the lidar's clock.
     pub fn packet(&mut self) -> [u8; FRAME] {
         let mut packet = self.demo.packet();
