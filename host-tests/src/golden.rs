@@ -7,12 +7,12 @@ use anyhow::{Context, Result, bail};
 use beamfix::geometry::Pose;
 
 use crate::board::recording::Recording;
-use crate::encoder::ld06::{POINTS, Sensor};
 use crate::hash::PoseHash;
 use crate::pipeline::Pipeline;
 use crate::readers::{self, Recorded, capture};
 use crate::shared;
-use crate::sim::{self, Settings, TruePose};
+use beamfix_sim::encoder::ld06::{POINTS, Sensor};
+use beamfix_sim::{Settings, TruePose};
 
 /// A run to be repeated bit by bit.
 pub struct Golden {
@@ -44,7 +44,7 @@ pub fn simulated() -> Result<Golden> {
         mount: TruePose::new(0.0, 0.0, 0.0),
         ..Settings::DEFAULT
     };
-    let drive = sim::drive(&settings, &mut Sensor::ld06());
+    let drive = beamfix_sim::drive(&settings, &mut Sensor::ld06());
     let (turns, summary) = capture::turns("ld06", &drive.bytes)?;
     let frame = drive.bytes.len() / summary.packets.max(1) as usize;
     let mut recording = Recording::new();

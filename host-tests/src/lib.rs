@@ -2,7 +2,6 @@
 
 pub mod board;
 pub mod decode;
-pub mod encoder;
 pub mod golden;
 pub mod hash;
 pub mod learn;
@@ -14,7 +13,6 @@ pub mod readers;
 pub mod recording;
 pub mod score;
 pub mod shared;
-pub mod sim;
 pub mod size;
 pub mod telemetry_file;
 pub mod timed;

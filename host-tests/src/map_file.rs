@@ -11,7 +11,7 @@ use anyhow::{Context, Result, bail, ensure};
 use beamfix::geometry::Pose;
 use beamfix::grid::{Grid, Shape, distance, occupancy};
 
-use crate::sim::world::World;
+use beamfix_sim::world::World;
 
 /// A map in memory: [`occupancy`] bytes.
 pub type Map = Grid<Vec<u8>>;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use beamfix::geometry::Pose;
 
-use crate::sim::TruePose;
+use beamfix_sim::TruePose;
 
 /// A match is right below these (m, degrees).
 const RIGHT: (f64, f64) = (0.05, 1.0);
@@ -13,7 +13,7 @@ const RIGHT: (f64, f64) = (0.05, 1.0);
 #[must_use]
 pub fn error(found: Pose, truth: Pose) -> (f64, f64) {
     let (found, truth) = (TruePose::from(found), TruePose::from(truth));
-    let turn = crate::sim::pose::wrap(found.theta - truth.theta);
+    let turn = beamfix_sim::pose::wrap(found.theta - truth.theta);
     let (x, y) = (found.x - truth.x, found.y - truth.y);
     (libm::sqrt(x * x + y * y), turn.to_degrees().abs())
 }

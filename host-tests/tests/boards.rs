@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use beamfix_app::{BEAMS, telemetry::Telemetry};
+use beamfix_sim::drive::{Settings, drive};
+use beamfix_sim::encoder::{Echo, Encoder as _, damage, ld06::Sensor};
 use host_tests::{
     board::{BOARDS, Replay, difference, emulator::Count, recording::Recording, stream},
-    encoder::{Echo, Encoder as _, damage, ld06::Sensor},
     readers,
-    sim::drive::{Settings, drive},
 };
 
 /// Bytes of an LD06 that stands in a square room, 8 m wide, with a door open, and turns by a degree a second.

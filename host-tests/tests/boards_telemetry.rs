@@ -7,7 +7,7 @@ use beamfix_app::{
         Verdict, Weak,
     },
 };
-use host_tests::encoder::{Echo, Encoder as _, ld06::Sensor};
+use beamfix_sim::encoder::{Echo, Encoder as _, ld06::Sensor};
 
 /// No zero byte in it.
 const WORST: f32 = f32::from_bits(0xbf9d_3f71);

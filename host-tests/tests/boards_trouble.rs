@@ -18,6 +18,7 @@ use beamfix_app::{
     link::Receiver,
     telemetry::{Health, LidarState, MotorState, Pose, Reset, Telemetry},
 };
+use beamfix_sim::noise::Noise;
 use common::cable::{Cable, PACKET_US};
 use host_tests::board::{
     BOARDS,
@@ -25,7 +26,6 @@ use host_tests::board::{
     rp2040js::{Job, PICO, Report},
     stream::Stream,
 };
-use host_tests::sim::noise::Noise;
 
 /// Longest that anything may take; a tenth of it does on an idle machine.
 const PATIENCE: Duration = Duration::from_secs(90);

@@ -4,6 +4,7 @@
 //! `cargo test --release --test boards_uart -- --ignored --nocapture`
 
 use beamfix_app::{BEAMS, checks, demo::Demo, telemetry::Telemetry};
+use beamfix_sim::encoder::damage;
 use host_tests::board::{
     BOARDS, Board, Replay, STM32F4, difference,
     firmware::Firmware,
@@ -11,7 +12,6 @@ use host_tests::board::{
     rp2040js::{Job, PICO, PICO_EMBASSY},
     stream,
 };
-use host_tests::encoder::damage;
 
 /// Of the demo's robot, which drives in a circle as long as one likes.
 fn ld06(seconds: f64) -> Vec<u8> {

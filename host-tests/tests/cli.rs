@@ -6,10 +6,10 @@ use std::fs;
 use std::path::Path;
 use std::process::Output;
 
+use beamfix_sim::encoder::ld06::Sensor;
+use beamfix_sim::{Noise, Settings, Still, TruePose, drive, scenes};
 use common::tool::{beamfix, folder, json};
 use flate2::{Compression, write::GzEncoder};
-use host_tests::encoder::ld06::Sensor;
-use host_tests::sim::{Noise, Settings, Still, TruePose, drive, scenes};
 use serde_json::Value;
 use std::io::Write;
 

@@ -10,8 +10,8 @@ use beamfix::{
     },
     scan::{Beam, Range, ScanPoint},
 };
+use beamfix_sim::{Noise, Still, TruePose, World, scenes};
 use common::{points_from, points_of};
-use host_tests::sim::{Noise, Still, TruePose, World, scenes};
 
 const BEAMS: usize = 360;
 const SEEDS: u64 = 50;

@@ -4,7 +4,7 @@ use beamfix::sensor_model::{
     BeamModel,
     beam_model::learning::{ByIncidence, Learner},
 };
-use host_tests::sim::noise::Noise;
+use beamfix_sim::noise::Noise;
 
 /// A range that `model` gives where `expected` is.
 fn draw(model: &BeamModel, expected: f64, noise: &mut Noise) -> Option<f32> {

@@ -5,11 +5,12 @@ mod common;
 use std::fs;
 
 use beamfix::sensor_model::likelihood_field::stored;
+use beamfix_sim::home;
 use common::{
     shared,
     tool::{beamfix, folder, text},
 };
-use host_tests::{map_file, sim::home};
+use host_tests::map_file;
 
 #[test]
 fn a_map_becomes_a_table_for_flash() {

@@ -13,8 +13,8 @@ use beamfix::{
     scan::{Bearing, ScanPoint},
     sensor_model::likelihood_field::{Field, FieldModel, LikelihoodField},
 };
+use beamfix_sim::{noise::Noise, pose::TruePose, scenes};
 use common::{field_of, over_pairs, points_from};
-use host_tests::sim::{noise::Noise, pose::TruePose, scenes};
 
 /// A field with smooth bumps, what is unexplored, and noise.
 fn random_field(noise: &mut Noise) -> LikelihoodField<Vec<u8>> {
@@ -245,8 +245,8 @@ fn a_corridor_is_weak_along_itself_and_two_equal_rooms_are_ambiguous() {
     assert!(off.distance() < 0.06 && off.theta.abs() < 0.042, "{off:?}");
 }
 
-fn beamfix_rooms() -> host_tests::sim::world::World {
-    let mut rooms = host_tests::sim::world::World::default();
+fn beamfix_rooms() -> beamfix_sim::world::World {
+    let mut rooms = beamfix_sim::world::World::default();
     rooms.block([0.0, 0.0], [3.0, 3.0]);
     rooms.block([3.2, 0.0], [6.2, 3.0]);
     for x in [0.0, 3.2] {

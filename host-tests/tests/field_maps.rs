@@ -20,11 +20,9 @@ use beamfix::{
         tiles::Tiles,
     },
 };
+use beamfix_sim::{home, noise::Noise, pose::TruePose, scenes};
 use common::points_from;
-use host_tests::{
-    map_file,
-    sim::{home, noise::Noise, pose::TruePose, scenes},
-};
+use host_tests::map_file;
 
 #[test]
 fn tiles_hold_what_one_table_holds() {

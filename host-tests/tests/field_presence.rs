@@ -9,11 +9,9 @@ use beamfix::{
     matching::correlative::{Correlator, pyramid::Pyramid},
     sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile, stamp::Canvas},
 };
+use beamfix_sim::{home, noise::Noise, pose::TruePose, world::World};
 use common::points_from;
-use host_tests::{
-    map_file,
-    sim::{home, noise::Noise, pose::TruePose, world::World},
-};
+use host_tests::map_file;
 
 /// The front of a dock, 0.7 m wide, with a notch 0.12 m deep: x forward, out of the dock.
 const FRONT: [[f64; 2]; 6] = [

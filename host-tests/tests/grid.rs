@@ -10,7 +10,7 @@ use beamfix::{
     },
     scan::{Bearing, points::ScanPoint},
 };
-use host_tests::sim::noise::Noise;
+use beamfix_sim::noise::Noise;
 
 /// A grid with about `share` of its cells occupied.
 fn random_cells(noise: &mut Noise, len: usize, share: f64) -> Vec<u8> {

@@ -2,7 +2,7 @@
 
 use beamfix::lidar::identify::{Hint, hints, identify};
 use beamfix::lidar::{Family, Model};
-use host_tests::encoder::{self, Echo, damage};
+use beamfix_sim::encoder::{self, Echo, damage};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -8,7 +8,7 @@ use beamfix::lidar::{
     xv11, ydlidar,
 };
 use beamfix::scan::Assembler;
-use host_tests::encoder::{self, Echo, Encoder, damage};
+use beamfix_sim::encoder::{self, Echo, Encoder, damage};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng, seq::IndexedRandom};
 use rand_chacha::ChaCha8Rng;

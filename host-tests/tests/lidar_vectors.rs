@@ -4,8 +4,8 @@
 use beamfix::lidar::rplidar::command;
 use beamfix::lidar::scip::command::{Parameters, Part, Replies};
 use beamfix::lidar::{Family, Model, Packet, Protocol, delta, ld06, sick, ydlidar};
+use beamfix_sim::encoder;
 use host_tests::decode::{self, WithParser, with_parser};
-use host_tests::encoder;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;

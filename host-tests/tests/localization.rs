@@ -9,11 +9,9 @@ use beamfix::{
     scan::ScanPoint,
     sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile},
 };
+use beamfix_sim::{home, lidar::Still, noise::Noise, pose::TruePose, world::World};
 use common::points_of;
-use host_tests::{
-    map_file::{self, Map},
-    sim::{home, lidar::Still, noise::Noise, pose::TruePose, world::World},
-};
+use host_tests::map_file::{self, Map};
 
 const BEAMS: usize = 450;
 type Robot<'a> = Localizer<'a, 96>;
@@ -267,7 +265,7 @@ fn tracks(place: &Place, seed: u64) -> (f64, f64, u32, u32) {
         let points = scan(&crowd, pose, &mut noise);
         if k % 50 == 0 {
             let empty = Still {
-                ranging: host_tests::sim::lidar::Ranging {
+                ranging: beamfix_sim::lidar::Ranging {
                     sigma: 0.0,
                     ..Still::full_turn(BEAMS).ranging
                 },

@@ -5,7 +5,7 @@
 use core::f64::consts::TAU;
 
 use beamfix::math;
-use host_tests::sim::Noise;
+use beamfix_sim::Noise;
 
 /// Floats from `low` to `high`, both of one sign, by their bits.
 fn floats(low: f32, high: f32) -> impl Iterator<Item = f32> {

@@ -6,9 +6,9 @@ use std::process::Command;
 use std::time::Duration;
 
 use beamfix_app::{App, AppConfig, CONFIG, Output, mavlink, telemetry::Reset};
+use beamfix_sim::drive::{Settings, drive};
+use beamfix_sim::encoder::ld06::Sensor;
 use host_tests::board::{MAVLINK, Replay, recording::Recording, stream::Stream};
-use host_tests::encoder::ld06::Sensor;
-use host_tests::sim::drive::{Settings, drive};
 use serde_json::Value;
 
 /// Python with pymavlink, in a folder of its own; `None`, after a line that says why, where it cannot be had.

@@ -5,10 +5,10 @@ use std::path::Path;
 use beamfix::geometry::Pose;
 use beamfix::odometry::OdometryConfig;
 use beamfix::scan::Mount;
+use beamfix_sim::TruePose;
 use host_tests::pipeline::Pipeline;
 use host_tests::readers::{self, Log};
 use host_tests::score::{self, mean};
-use host_tests::sim::TruePose;
 use host_tests::{shared, size, sized};
 
 /// A scan's stamp (s) and where the robot was.

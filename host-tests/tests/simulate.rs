@@ -4,12 +4,12 @@ use beamfix::geometry::Pose;
 use beamfix::math::wrap_angle;
 use beamfix::odometry::OdometryConfig;
 use beamfix::scan::Mount;
-use host_tests::encoder::ld06::Sensor;
+use beamfix_sim::encoder::ld06::Sensor;
+use beamfix_sim::{Drive, Settings, drive, scenes};
+use beamfix_sim::{Noise, Still, TruePose};
 use host_tests::pipeline::Pipeline;
 use host_tests::readers::capture;
 use host_tests::score;
-use host_tests::sim::{Drive, Settings, drive, scenes};
-use host_tests::sim::{Noise, Still, TruePose};
 
 fn run(seed: u64, seconds: f64) -> Drive {
     let settings = Settings {

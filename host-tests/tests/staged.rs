@@ -26,8 +26,8 @@ use beamfix::{
     },
     scan::ScanPoint,
 };
+use beamfix_sim::{Noise, TruePose, scenes};
 use common::points_from;
-use host_tests::sim::{Noise, TruePose, scenes};
 
 const BEAMS: usize = 360;
 const SEEDS: u64 = 20;

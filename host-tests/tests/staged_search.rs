@@ -4,7 +4,7 @@ use beamfix::{
     matching::staged::correspondence::nearest::{Found, Place, Sweep, brute_force},
     scan::{Bearing, ScanPoint},
 };
-use host_tests::sim::Noise;
+use beamfix_sim::Noise;
 
 /// Kinds of scans, each with its own way to mislead a walk.
 const KINDS: [&str; 8] = [

@@ -10,8 +10,8 @@ use beamfix::{
     },
     scan::ScanPoint,
 };
+use beamfix_sim::{Noise, TruePose, World, scenes};
 use common::points_from;
-use host_tests::sim::{Noise, TruePose, World, scenes};
 
 const BEAMS: usize = 360;
 

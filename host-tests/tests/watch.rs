@@ -6,9 +6,9 @@ use std::fs;
 use std::path::Path;
 
 use beamfix_app::{App, AppConfig, CONFIG, telemetry::Reset};
+use beamfix_sim::drive::{Settings, drive};
+use beamfix_sim::encoder::ld06::Sensor;
 use common::tool::{beamfix, folder, json, text};
-use host_tests::encoder::ld06::Sensor;
-use host_tests::sim::drive::{Settings, drive};
 
 /// PNG, and large enough to hold a drawing.
 fn is_picture(path: &Path) {

@@ -13,10 +13,8 @@ use super::{
     card::keep,
     emulator::{self, Count},
 };
-use crate::{
-    readers::pairs::{self, Pair},
-    sim::{Noise, Still, TruePose, scenes},
-};
+use crate::readers::pairs::{self, Pair};
+use beamfix_sim::{Noise, Still, TruePose, scenes};
 
 /// Every board with every matcher that has room on it.
 pub const ALL: [(&str, Which); 4] = [

@@ -8,10 +8,8 @@ use object::{Object as _, ObjectSection as _, SectionFlags, SectionKind};
 use serde::{Deserialize, Serialize};
 
 use super::{Board, emulator::Count, real::RealCard, recording::Recording, root};
-use crate::{
-    encoder::ld06::Sensor,
-    sim::drive::{Settings, drive},
-};
+use beamfix_sim::drive::{Settings, drive};
+use beamfix_sim::encoder::ld06::Sensor;
 
 /// One row: a board with the application.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

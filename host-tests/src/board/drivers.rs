@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::{Board, Count, emulator};
 use crate::decode::{WithParser, with_parser};
-use crate::encoder::{self, Echo};
+use beamfix_sim::encoder::{self, Echo};
 
 /// What a driver costs.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -19,7 +19,7 @@ use super::{
     Board,
     emulator::{self, Count},
 };
-use crate::sim::{Noise, Still, TruePose, scenes};
+use beamfix_sim::{Noise, Still, TruePose, scenes};
 
 /// Beams of the scan.
 pub const BEAMS: usize = 360;

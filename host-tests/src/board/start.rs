@@ -14,10 +14,8 @@ use super::{
     Board,
     emulator::{self, Count},
 };
-use crate::{
-    map_file,
-    sim::{Noise, Still, TruePose, home},
-};
+use crate::map_file;
+use beamfix_sim::{Noise, Still, TruePose, home};
 
 /// Bytes that a step may look up: 20 ms at 168 MHz or so.
 const BUDGET: u32 = 500_000;

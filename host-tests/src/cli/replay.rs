@@ -8,12 +8,12 @@ use anyhow::{Result, anyhow, bail};
 use beamfix::geometry::Pose;
 use beamfix::odometry::{Counters, OdometryConfig};
 use beamfix::scan::Mount;
+use beamfix_sim::TruePose;
 use clap::ValueEnum;
 use host_tests::hash::PoseHash;
 use host_tests::picture;
 use host_tests::pipeline::Pipeline;
 use host_tests::readers::{self, Log, capture};
-use host_tests::sim::TruePose;
 use host_tests::{size, sized};
 use serde_json::json;
 

@@ -10,16 +10,17 @@ use beamfix::geometry::Pose;
 use beamfix::lidar::Model;
 use beamfix::odometry::{Counters, OdometryConfig};
 use beamfix::scan::Mount;
+use beamfix_sim::encoder;
+use beamfix_sim::lidar::Ranging;
+use beamfix_sim::{Drive, Settings};
 use host_tests::decode::{self, Summary};
 use host_tests::map_file;
 use host_tests::picture;
 use host_tests::pipeline::Pipeline;
 use host_tests::readers::capture::{self, Turn};
 use host_tests::recording::Recording;
-use host_tests::sim::lidar::Ranging;
-use host_tests::sim::{self, Drive, Settings};
 use host_tests::timed::{Content, Recorder};
-use host_tests::{encoder, size, sized};
+use host_tests::{size, sized};
 use serde_json::json;
 
 use super::output;
@@ -75,7 +76,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         },
         ..Settings::DEFAULT
     };
-    let drive = sim::drive(&settings, encoder::for_model(model).as_mut());
+    let drive = beamfix_sim::drive(&settings, encoder::for_model(model).as_mut());
     if let Some(path) = &args.ros_map {
         write_map(&drive, path)?;
     }
@@ -237,6 +238,6 @@ fn follow<const N: usize>(
 }
 
 /// The robot at a turn's last beam.
-fn moment(drive: &Drive, turn: &Turn) -> Option<sim::Moment> {
+fn moment(drive: &Drive, turn: &Turn) -> Option<beamfix_sim::Moment> {
     drive.moments.get(turn.ends_at.checked_sub(1)?).copied()
 }

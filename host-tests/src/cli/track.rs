@@ -2,10 +2,10 @@
 
 use beamfix::geometry::{Point, Pose};
 use beamfix::scan::Beam;
+use beamfix_sim::{TruePose, World};
 use host_tests::picture::{chart::Errors as Chart, colour, map::Map, map::Path};
 use host_tests::pipeline::places;
 use host_tests::score;
-use host_tests::sim::{TruePose, World};
 
 /// A robot at the end of a scan; all poses in the frame in which it started.
 #[derive(Clone, Copy)]

@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use beamfix_app::command::Command;
+use beamfix_sim::drive::{Settings, drive};
+use beamfix_sim::encoder::ld06::Sensor;
 use host_tests::board::{Board, recording, stream::Stream};
-use host_tests::encoder::ld06::Sensor;
 use host_tests::picture;
-use host_tests::sim::drive::{Settings, drive};
 use host_tests::watch::Watch;
 use serde_json::json;
 

@@ -6,7 +6,7 @@ use plotters::prelude::*;
 
 use super::axes::{bounds, dots, header, line, metres};
 use super::{Drawing, colour};
-use crate::sim::World;
+use beamfix_sim::World;
 
 /// A path with its name in the legend.
 #[derive(Debug, Clone)]

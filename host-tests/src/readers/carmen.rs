@@ -12,7 +12,7 @@ use beamfix::geometry::Pose;
 use beamfix::scan::{Beam, Bearing, NoReturn, Range};
 
 use super::{Log, Recorded, clock::Clock};
-use crate::sim::TruePose;
+use beamfix_sim::TruePose;
 
 /// From here on the largest reading of a log stands for "no return": 50.0, 51.2, 81.83, 81.91 are in use.
 const NO_RETURN_FROM: f32 = 49.0;

@@ -8,7 +8,7 @@ use anyhow::{Result, bail, ensure};
 use beamfix::scan::{Beam, Bearing, NoReturn, Range};
 
 use super::{Log, Recorded, clock::Clock};
-use crate::sim::TruePose;
+use beamfix_sim::TruePose;
 
 /// The first bytes of such a file.
 pub const MAGIC: &[u8] = b"LSCN";

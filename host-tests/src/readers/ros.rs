@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 use beamfix::scan::{Beam, Bearing, NoReturn, Range};
 
 use super::{Log, Recorded, clock::Clock};
-use crate::sim::TruePose;
+use beamfix_sim::TruePose;
 
 /// The first bytes of such a file.
 pub const MAGIC: &[u8] = b"\x89MCAP0\r\n";

@@ -16,10 +16,8 @@ use beamfix::{
         stamp::{self, Canvas, StampConfig},
     },
 };
-use host_tests::{
-    readers::pairs::{self, Pair},
-    sim::{lidar::Still, noise::Noise, pose::TruePose, world::World},
-};
+use beamfix_sim::{lidar::Still, noise::Noise, pose::TruePose, world::World};
+use host_tests::readers::pairs::{self, Pair};
 
 /// A file among the shared data; says so where it is missing.
 pub fn shared(file: &str) -> Option<PathBuf> {

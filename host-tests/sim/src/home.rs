@@ -1,11 +1,13 @@
 //! A home of 20 m by 16 m with seven rooms: the place where the robot has to find itself.
 
-use beamfix::{geometry::Point, grid::occupancy};
+use beamfix::{
+    geometry::Point,
+    grid::{Grid, occupancy},
+};
 
 use super::noise::Noise;
 use super::pose::TruePose;
 use super::world::World;
-use crate::map_file::Map;
 
 /// Lower left and upper right corner of the home.
 pub const EXTENT: ([f64; 2], [f64; 2]) = ([0.0, 0.0], [20.0, 16.0]);
@@ -83,7 +85,12 @@ pub fn home() -> World {
 pub const INSIDE: [f64; 2] = [6.0, 7.9];
 
 /// A place on the floor with at least `clearance` metres all around, looking anywhere.
-pub fn home_place(world: &World, map: &Map, clearance: f64, noise: &mut Noise) -> TruePose {
+pub fn home_place(
+    world: &World,
+    map: &Grid<Vec<u8>>,
+    clearance: f64,
+    noise: &mut Noise,
+) -> TruePose {
     use core::f64::consts::PI;
     loop {
         let pose = TruePose::new(
@@ -99,7 +106,7 @@ pub fn home_place(world: &World, map: &Map, clearance: f64, noise: &mut Noise) -
 
 /// Whether a map has floor there.
 #[must_use]
-pub fn on_floor(map: &Map, pose: TruePose) -> bool {
+pub fn on_floor(map: &Grid<Vec<u8>>, pose: TruePose) -> bool {
     let (x, y) = map
         .shape()
         .cell_of(Point::new(pose.x as f32, pose.y as f32));

@@ -8,6 +8,7 @@
 //! ```
 
 pub mod drive;
+pub mod encoder;
 pub mod home;
 pub mod lidar;
 pub mod noise;
