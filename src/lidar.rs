@@ -24,7 +24,7 @@
 //! | [`sick`] | LMS200, LMS291 | documented telegrams, generated scans |
 //!
 //! Not supported: Roborock's LDS01RR with the header `E7 7E` (its one description leaves open where the fields lie;
-//! units with the XV-11's frames are [`Model::LDS02RR`]), Delta-3A, YDLIDAR R3. The four-byte samples of the YDLIDAR
+//! units with the XV-11's frames are [`Model::XIAOMI_LDS02RR`]), Delta-3A, YDLIDAR R3. The four-byte samples of the YDLIDAR
 //! T-mini Plus SH follow the maker's software and were never seen on a line.
 //!
 //! Which way the angles of LDS02RR and COIN-D4 grow, and where the zero of many sensors looks, no source proves: try it on
@@ -104,6 +104,6 @@ pub struct Counters {
     pub check_errors: u32,
     /// Bytes that belong to no accepted frame.
     pub skipped_bytes: u32,
-    /// Turns begun.
-    pub turns: u32,
+    /// Revolutions begun.
+    pub revolutions: u32,
 }

@@ -89,7 +89,7 @@ pub fn model(name: &str, bytes: &[u8]) -> Result<&'static Model, DecodeError> {
     match identify::identify(start) {
         Some(finding) => Ok(finding.model),
         None => {
-            let hints = identify::hints(&Model::LD06, start);
+            let hints = identify::hints(&Model::LDROBOT_LD06, start);
             Err(DecodeError::NothingFits(
                 hints.map(|hint| hint.to_string()).collect(),
             ))
@@ -165,7 +165,7 @@ impl Summary {
         sink: &mut dyn FnMut(Row),
     ) {
         for (k, (sample, beam)) in packet.samples().zip(packet.beams()).enumerate() {
-            let turn_starts = packet.turn_start() == Some(k);
+            let turn_starts = packet.revolution_start() == Some(k);
             self.scans += u32::from(turn_starts);
             self.points += 1;
             let turned = is_signed && sample.angle_deg >= 180.0;

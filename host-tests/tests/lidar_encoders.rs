@@ -73,7 +73,7 @@ impl WithParser for Beams<'_> {
         let (mut beams, mut starts, mut speed) = (Vec::new(), Vec::new(), None);
         for &byte in self.0 {
             if let Some(packet) = parser.push(byte) {
-                starts.extend(packet.turn_start().map(|k| beams.len() + k));
+                starts.extend(packet.revolution_start().map(|k| beams.len() + k));
                 beams.extend(packet.beams());
                 speed = packet.speed_rpm().or(speed);
             }
@@ -119,7 +119,7 @@ fn check_model(model: &Model, seed: u64) {
         "{name}: {bits_per_s} bits/s"
     );
     if let Some(rpm) = speed {
-        let sent = 6.0 * f32::from(model.turns_per_10s);
+        let sent = 6.0 * f32::from(model.revolutions_per_10s);
         assert!((rpm - sent).abs() < 1.6, "{name}: {rpm} rpm, not {sent}");
     }
     let (mut lost, mut is_first) = (0, true);
@@ -180,7 +180,7 @@ fn check_model(model: &Model, seed: u64) {
     assert!(lost <= may_lose, "{name}: {lost} lost");
     // A turn starts where the sensor's own angle falls.
     if !matches!(model.family, Family::Scip(_) | Family::Sick) {
-        let turns = beams.len() as f64 * f64::from(model.turns_per_10s)
+        let turns = beams.len() as f64 * f64::from(model.revolutions_per_10s)
             / 10.0
             / f64::from(model.points_per_s);
         assert!(
@@ -201,7 +201,7 @@ fn every_model_comes_back() {
 #[test]
 fn turns_fit_the_scan_that_the_model_asks_for() {
     for model in Model::ALL {
-        let per_turn = usize::from(model.beams_per_turn);
+        let per_turn = usize::from(model.beams_per_revolution);
         let (_, line) = fire(model, 3 * per_turn + 400, 2);
         let (beams, starts, ..) = with_parser(model, Beams(&line));
         let mut assembler = Box::new(Assembler::<3500>::new());
@@ -284,9 +284,9 @@ fn replayed_bytes_have_their_times() {
     for model in [
         Model::RPLIDAR_SCAN,
         Model::RPLIDAR_EXPRESS,
-        Model::X4,
-        Model::XV11,
-        Model::X1,
+        Model::YDLIDAR_X4,
+        Model::NEATO_XV11,
+        Model::CAMSENSE_X1,
         Model::DELTA_2A,
     ] {
         let start_us = 5_000_000.0;

@@ -62,12 +62,12 @@ fn every_encoder_is_recognised() {
     }
     // Models of one family that their pace tells apart.
     for model in [
-        Model::LD06,
-        Model::LD14,
-        Model::LD14P,
-        Model::STL19P,
-        Model::STL27L,
-        Model::LDS02,
+        Model::LDROBOT_LD06,
+        Model::LDROBOT_LD14,
+        Model::LDROBOT_LD14P,
+        Model::LDROBOT_STL19P,
+        Model::LDROBOT_STL27L,
+        Model::LDROBOT_LDS02,
     ] {
         let found = identify(&second(&model)).expect("found");
         assert_eq!(found.model.name, model.name);
@@ -77,18 +77,18 @@ fn every_encoder_is_recognised() {
 #[test]
 fn every_capture_is_recognised() {
     for (file, expected) in [
-        ("ld19-20240828.bin", Model::LD06),
-        ("ydlidar-x4-b.bin", Model::X4),
-        ("ydlidar-g2-packet-a.bin", Model::TMINI),
+        ("ld19-20240828.bin", Model::LDROBOT_LD06),
+        ("ydlidar-x4-b.bin", Model::YDLIDAR_X4),
+        ("ydlidar-g2-packet-a.bin", Model::YDLIDAR_TMINI),
         ("rplidar-a1-standard.bin", Model::RPLIDAR_SCAN),
         ("rplidar-a1-room-0001.bin", Model::RPLIDAR_SCAN),
         ("rplidar-a1-room-0004.bin", Model::RPLIDAR_SCAN),
         ("rplidar-express-capsules.bin", Model::RPLIDAR_EXPRESS),
-        ("xv11-fw24-first-half.bin", Model::XV11),
-        ("xv11-fw21-a.bin", Model::XV11_EARLY),
-        ("camsense-x1-a.bin", Model::X1),
-        ("urg-04lx-md.txt", Model::URG04LX),
-        ("doc-ld06-frame.bin", Model::LD06),
+        ("xv11-fw24-first-half.bin", Model::NEATO_XV11),
+        ("xv11-fw21-a.bin", Model::NEATO_XV11_EARLY),
+        ("camsense-x1-a.bin", Model::CAMSENSE_X1),
+        ("urg-04lx-md.txt", Model::HOKUYO_URG04LX),
+        ("doc-ld06-frame.bin", Model::LDROBOT_LD06),
         ("doc-delta-2a-frame.bin", Model::DELTA_2A),
     ] {
         let Some(path) = common::shared(&format!("datasets/serial/{file}")) else {
@@ -106,28 +106,28 @@ fn every_capture_is_recognised() {
 #[test]
 fn plain_words_where_something_is_wrong() {
     let all = |model: &Model, bytes: &[u8]| hints(model, bytes).collect::<Vec<_>>();
-    assert_eq!(all(&Model::LD06, &[]), [Hint::Silence]);
+    assert_eq!(all(&Model::LDROBOT_LD06, &[]), [Hint::Silence]);
 
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let noise: Vec<u8> = (0..20_000).map(|_| rng.random()).collect();
     assert_eq!(identify(&noise), None);
-    assert_eq!(all(&Model::LD06, &noise), [Hint::NothingFits]);
+    assert_eq!(all(&Model::LDROBOT_LD06, &noise), [Hint::NothingFits]);
 
-    let ld06 = second(&Model::LD06);
+    let ld06 = second(&Model::LDROBOT_LD06);
     let swallowed: Vec<u8> = ld06
         .iter()
         .copied()
         .filter(|byte| !matches!(byte, 0x11 | 0x13))
         .collect();
-    assert!(all(&Model::LD06, &swallowed).contains(&Hint::FlowControl));
+    assert!(all(&Model::LDROBOT_LD06, &swallowed).contains(&Hint::FlowControl));
     let seven: Vec<u8> = ld06.iter().map(|byte| byte & 0x7f).collect();
-    assert!(all(&Model::LD06, &seven).contains(&Hint::SevenBits));
+    assert!(all(&Model::LDROBOT_LD06, &seven).contains(&Hint::SevenBits));
     assert!(
-        matches!(all(&Model::X4, &ld06)[..], [Hint::OtherModel { found }] if found.name == "ld06")
+        matches!(all(&Model::YDLIDAR_X4, &ld06)[..], [Hint::OtherModel { found }] if found.name == "ld06")
     );
 
-    let tmini = second(&Model::TMINI);
-    let found = all(&Model::X4, &tmini);
+    let tmini = second(&Model::YDLIDAR_TMINI);
+    let found = all(&Model::YDLIDAR_X4, &tmini);
     assert!(
         matches!(
             found[..],
@@ -143,7 +143,7 @@ fn plain_words_where_something_is_wrong() {
     let mut bad = ld06;
     damage::hit(&mut bad, 40, &mut rng);
     assert!(matches!(
-        all(&Model::LD06, &bad)[..],
+        all(&Model::LDROBOT_LD06, &bad)[..],
         [Hint::Damaged { .. }]
     ));
 }
@@ -154,5 +154,5 @@ fn flow_control_in_the_recording_is_noticed() {
         return;
     };
     let bytes = std::fs::read(path).expect("readable");
-    assert!(hints(&Model::LD06, &bytes).any(|hint| hint == Hint::FlowControl));
+    assert!(hints(&Model::LDROBOT_LD06, &bytes).any(|hint| hint == Hint::FlowControl));
 }

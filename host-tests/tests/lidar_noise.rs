@@ -97,7 +97,7 @@ fn ld19_keeps_every_frame_that_400_faults_leave() {
 /// A lost zero frame does not make one turn of two.
 #[test]
 fn ydlidar_turns_begin_without_their_zero_frames() {
-    for model in [Model::X4, Model::TMINI] {
+    for model in [Model::YDLIDAR_X4, Model::YDLIDAR_TMINI] {
         let clean = stream(&mut *encoder::for_model(&model), 20_000);
         let Family::Ydlidar(samples) = model.family else {
             panic!("not a YDLIDAR");
@@ -118,7 +118,7 @@ fn ydlidar_turns_begin_without_their_zero_frames() {
             let (mut turns, mut longest) = (0, 0);
             for packet in bytes.iter().filter_map(|&byte| parser.push(byte)) {
                 for (k, beam) in packet.beams().enumerate() {
-                    if assembler.push(beam, packet.turn_start() == Some(k)) {
+                    if assembler.push(beam, packet.revolution_start() == Some(k)) {
                         turns += 1;
                         longest = longest.max(assembler.scan().len());
                     }
@@ -179,7 +179,7 @@ fn hammer<F: Format + Clone>(parser_format: &F, lengths: &[usize], header: &[(us
         };
         let beams = packet.beams().count();
         assert_eq!(beams, packet.samples().count());
-        assert!(packet.turn_start().is_none_or(|start| start < beams));
+        assert!(packet.revolution_start().is_none_or(|start| start < beams));
         for sample in packet.samples() {
             assert!((0.0..360.0).contains(&sample.angle_deg), "{sample:?}");
             assert!(sample.range_mm.is_none_or(|mm| mm > 0.0), "{sample:?}");
@@ -190,7 +190,11 @@ fn hammer<F: Format + Clone>(parser_format: &F, lengths: &[usize], header: &[(us
 
 #[test]
 fn no_content_of_a_frame_is_too_much() {
-    for model in [Model::LD06, Model::LD14, Model::LDS02] {
+    for model in [
+        Model::LDROBOT_LD06,
+        Model::LDROBOT_LD14,
+        Model::LDROBOT_LDS02,
+    ] {
         hammer(ld06::Parser::for_model(&model).format(), &[47], &[]);
     }
     hammer(rplidar::Parser::new().format(), &[5], &[]);
@@ -209,10 +213,10 @@ fn no_content_of_a_frame_is_too_much() {
         &[],
     );
     for (model, lengths) in [
-        (Model::X4, [12, 90, 170]),
-        (Model::G6, [12, 90, 170]),
-        (Model::G2, [13, 130, 250]),
-        (Model::TMINI, [13, 130, 250]),
+        (Model::YDLIDAR_X4, [12, 90, 170]),
+        (Model::YDLIDAR_G6, [12, 90, 170]),
+        (Model::YDLIDAR_G2, [13, 130, 250]),
+        (Model::YDLIDAR_TMINI, [13, 130, 250]),
     ] {
         let parser = ydlidar::Parser::for_model(&model);
         for length in lengths {
@@ -227,14 +231,22 @@ fn no_content_of_a_frame_is_too_much() {
             );
         }
     }
-    hammer(lds01::Parser::for_model(&Model::LDS01).format(), &[42], &[]);
-    hammer(xv11::Parser::for_model(&Model::XV11).format(), &[22], &[]);
     hammer(
-        xv11::early::Parser::for_model(&Model::XV11_EARLY).format(),
+        lds01::Parser::for_model(&Model::HLS_LDS01).format(),
+        &[42],
+        &[],
+    );
+    hammer(
+        xv11::Parser::for_model(&Model::NEATO_XV11).format(),
+        &[22],
+        &[],
+    );
+    hammer(
+        xv11::early::Parser::for_model(&Model::NEATO_XV11_EARLY).format(),
         &[1446],
         &[],
     );
-    let x1 = camsense::Parser::for_model(&Model::X1);
+    let x1 = camsense::Parser::for_model(&Model::CAMSENSE_X1);
     for (kind, count) in [(3, 8), (7, 12), (2, 40), (7, 40)] {
         let size = if kind == 7 { 4 } else { kind };
         let length = 12 + count * size;
@@ -260,7 +272,7 @@ fn no_content_of_a_frame_is_too_much() {
         &[85],
         &[(3, 25)],
     );
-    let sick = sick::Parser::for_model(&Model::LMS200);
+    let sick = sick::Parser::for_model(&Model::SICK_LMS200);
     hammer(sick.format(), &[7, 9, 372, 732, 812], &[(4, 0xb0)]);
 }
 

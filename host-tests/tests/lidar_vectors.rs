@@ -73,7 +73,10 @@ impl WithParser for Decode<'_> {
         decoded.frames = parser.counters().packets;
         decoded.skipped_bytes = parser.counters().skipped_bytes;
         decoded.tail_bytes = parser.pending_bytes();
-        assert_eq!(parser.counters().turns as usize, decoded.scan_starts.len());
+        assert_eq!(
+            parser.counters().revolutions as usize,
+            decoded.scan_starts.len()
+        );
         decoded
     }
 }
@@ -82,7 +85,7 @@ impl Decoded {
     fn take(&mut self, packet: &impl Packet) {
         let first = self.points.len();
         self.scan_starts
-            .extend(packet.turn_start().map(|k| first + k));
+            .extend(packet.revolution_start().map(|k| first + k));
         let samples = packet.samples();
         self.points
             .extend(samples.map(|s| (s.angle_deg, s.range_mm, s.quality)));
@@ -201,7 +204,7 @@ fn check_family(family: &str, model: impl Fn(&Value) -> Model) {
 fn ldrobot() {
     check_family("ldrobot47", |vector| Model {
         points_per_s: vector["config"]["sample_rate_hz"].as_u64().unwrap_or(4500) as u32,
-        ..Model::LD06
+        ..Model::LDROBOT_LD06
     });
 }
 
@@ -246,7 +249,7 @@ fn ydlidar() {
         };
         Model {
             family: Family::Ydlidar(samples),
-            ..Model::X4
+            ..Model::YDLIDAR_X4
         }
     });
 }
@@ -254,19 +257,19 @@ fn ydlidar() {
 #[test]
 fn neato() {
     check_family("xv11", |vector| match vector["id"].as_str() {
-        Some("old-firmware-5AA500C0") => Model::XV11_EARLY,
-        _ => Model::XV11,
+        Some("old-firmware-5AA500C0") => Model::NEATO_XV11_EARLY,
+        _ => Model::NEATO_XV11,
     });
 }
 
 #[test]
 fn lds01() {
-    check_family("lds01", |_| Model::LDS01);
+    check_family("lds01", |_| Model::HLS_LDS01);
 }
 
 #[test]
 fn camsense() {
-    check_family("camsense", |_| Model::X1);
+    check_family("camsense", |_| Model::CAMSENSE_X1);
 }
 
 #[test]
@@ -300,7 +303,7 @@ fn scip() {
                 let Parameters {
                     nearest_mm,
                     farthest_mm,
-                    per_turn,
+                    per_revolution,
                     first,
                     last,
                     front,
@@ -309,7 +312,7 @@ fn scip() {
                 for (name, value) in [
                     ("DMIN", nearest_mm),
                     ("DMAX", farthest_mm),
-                    ("ARES", per_turn),
+                    ("ARES", per_revolution),
                     ("AMIN", first),
                     ("AMAX", last),
                     ("AFRT", front),
@@ -319,7 +322,7 @@ fn scip() {
                 }
             }
             "constructed-md" => {
-                let found = decoded(&Model::URG04LX, &bytes(&vector));
+                let found = decoded(&Model::HOKUYO_URG04LX, &bytes(&vector));
                 let replies = expect["replies"].as_array().expect("replies");
                 let scans = replies.iter().filter(|reply| reply["values"].is_array());
                 let values = scans.flat_map(|reply| reply["values"].as_array().expect("values"));
@@ -327,13 +330,13 @@ fn scip() {
                 assert_eq!((found.frames, found.skipped_bytes), (2, 0), "{id}");
             }
             "constructed-md-damaged" => {
-                let found = decoded(&Model::URG04LX, &bytes(&vector));
+                let found = decoded(&Model::HOKUYO_URG04LX, &bytes(&vector));
                 let second = expect["second_scan_values"].as_array().expect("values");
                 check_values(id, &found, second.iter());
                 assert_eq!(found.frames, 1, "{id}");
             }
             _ => {
-                let found = decoded(&Model::URG04LX, &bytes(&vector));
+                let found = decoded(&Model::HOKUYO_URG04LX, &bytes(&vector));
                 assert_eq!((found.frames, found.skipped_bytes), (1, 0), "{id}");
                 check_points(id, &found, expect, false);
             }
@@ -356,7 +359,7 @@ fn sick() {
     for vector in vectors("sick_lms2xx") {
         let bytes = bytes(&vector);
         if vector["kind"] != "command" {
-            let found = decoded(&Model::LMS200, &bytes);
+            let found = decoded(&Model::SICK_LMS200, &bytes);
             let expect = &vector["expect"];
             assert_eq!(Some(u64::from(found.frames)), expect["frames"].as_u64());
             assert_eq!(
@@ -463,7 +466,7 @@ fn parallax_tables() {
         };
         let model = Model {
             family: Family::Ldrobot(parallax),
-            ..Model::LD14
+            ..Model::LDROBOT_LD14
         };
         // One frame a row, all its points at the row's angle, so that shifts carry over as the table's do.
         let rows = vector["expect"]["rows"].as_array().expect("rows");

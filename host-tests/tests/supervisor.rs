@@ -78,7 +78,7 @@ fn a_motor_that_stalls_is_started_again() {
     let duty = Cell::new(7);
     let config = MotorConfig {
         initial_duty: 0.5,
-        ..MotorConfig::LD06
+        ..MotorConfig::LDROBOT_LD06
     };
     let mut supervisor = Supervisor::new(Pwm(&duty), Some(config), 0);
     assert_eq!(duty.get(), 500);

@@ -78,7 +78,7 @@ impl Layout for Frames {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet {
-    /// Speed (0.1 turns/s), where the frame tells.
+    /// Speed (0.1 revolutions/s), where the frame tells.
     pub speed_dhz: Option<u8>,
     view: View,
     fan: Fan<{ 3 * MOST_SAMPLES }>,

@@ -1,4 +1,4 @@
-//! 3irobotix Delta-1A, 2A, 2B, 2D, 2G: big-endian frames of a sixteenth or a fifteenth of a turn.
+//! 3irobotix Delta-1A, 2A, 2B, 2D, 2G: big-endian frames of a sixteenth or a fifteenth of a revolution.
 //!
 //! Source: the makers' protocol documents and their example frames. The host drives the motor.
 //!
@@ -10,14 +10,14 @@
 //! | 4 | `0x61` | |
 //! | 5 | `0xAD` measurements, `0xAE` speed out of range | |
 //! | 6 | length of the data, L - 8 | `u16` BE |
-//! | 8 | speed | 0.05 turns/s |
+//! | 8 | speed | 0.05 revolutions/s |
 //! | 9 | zero offset; informative | 0.01°, `i16` BE |
 //! | 11 | angle of the sector's start; of its end | 0.01° clockwise, `u16` BE |
 //! | … | n points: signal; distance, 0 for none | `u8`; mm/4, `u16` BE |
 //! | L | sum of all before | `u16` BE |
 
 use super::layout::{Context, Fan};
-use super::packet::{Turns, divided, from_cdeg};
+use super::packet::{Revolutions, divided, from_cdeg};
 use super::timing::Pace;
 use super::{Family, Model, Reading, Verdict, View};
 use crate::scan::NoReturn;
@@ -27,7 +27,7 @@ pub const FRAME: usize = 1026;
 /// Most points that a frame is believed to have; further ones are left out.
 pub const MOST_POINTS: usize = 120;
 
-/// How much of a turn a frame covers.
+/// how much of a revolution a frame covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sector {
@@ -60,7 +60,7 @@ impl Parser {
                 _ => Sector::Sixteenth,
             },
             previous_cdeg: None,
-            turns: Turns::new(),
+            revolutions: Revolutions::new(),
         };
         Self::with_format(format, model.baud)
     }
@@ -72,11 +72,11 @@ pub struct Format {
     base: View,
     sector: Sector,
     previous_cdeg: Option<u16>,
-    turns: Turns,
+    revolutions: Revolutions,
 }
 
 impl Format {
-    /// How much of a turn a frame covers, as configured or as two frames in a row told.
+    /// how much of a revolution a frame covers, as configured or as two frames in a row told.
     pub fn sector(&self) -> Sector {
         self.sector
     }
@@ -152,16 +152,16 @@ impl super::Format for Format {
             step = divided(from_cdeg(self.span_cdeg(start_cdeg, end_cdeg)), count);
         }
         let fan = Fan::new(first, step, 3, points)?;
-        // A turn at so many 0.05 turns a second takes 20e6 µs divided by them; `step` is a share of 2³² of it.
-        let turn_us = divided(20_000_000, speed_q05.into());
-        let period_q8 = if turn_us == 0 || step == 0 {
+        // A revolution at so many 0.05 revolutions a second takes 20e6 µs divided by them; `step` is a share of 2³² of it.
+        let revolution_us = divided(20_000_000, speed_q05.into());
+        let period_q8 = if revolution_us == 0 || step == 0 {
             self.base.period_q8
         } else {
-            ((u64::from(turn_us) * u64::from(step)) >> 24) as u32
+            ((u64::from(revolution_us) * u64::from(step)) >> 24) as u32
         };
         let context = Context {
             base: self.base,
-            turns: &mut self.turns,
+            revolutions: &mut self.revolutions,
             pace,
             bytes: frame.len() as u16,
         };
@@ -211,7 +211,7 @@ pub(super) fn judge(bytes: &[u8]) -> Verdict {
 pub struct Packet {
     /// `0xAD` measurements, `0xAE` speed out of range.
     pub command: u8,
-    /// Speed of the motor (0.05 turns/s).
+    /// Speed of the motor (0.05 revolutions/s).
     pub speed_q05: u8,
     view: View,
     fan: Fan<{ 3 * MOST_POINTS }>,

@@ -76,7 +76,7 @@ impl<const L: usize> Framer<L> {
                 packets: 0,
                 check_errors: 0,
                 skipped_bytes: 0,
-                turns: 0,
+                revolutions: 0,
                 answers: 0,
             },
         }

@@ -66,22 +66,22 @@ pub struct Finding {
 
 /// Families that frames tell apart, each by a model that stands for it.
 const CANDIDATES: [&Model; 17] = [
-    &Model::LD06,
-    &Model::X4,
-    &Model::TMINI,
-    &Model::TMINI_SH,
+    &Model::LDROBOT_LD06,
+    &Model::YDLIDAR_X4,
+    &Model::YDLIDAR_TMINI,
+    &Model::YDLIDAR_TMINI_SH,
     &Model::COIN_D4,
-    &Model::LDS01,
-    &Model::XV11,
-    &Model::XV11_EARLY,
-    &Model::X1,
+    &Model::HLS_LDS01,
+    &Model::NEATO_XV11,
+    &Model::NEATO_XV11_EARLY,
+    &Model::CAMSENSE_X1,
     &Model::DELTA_2A,
     &Model::RPLIDAR_EXPRESS,
     &Model::RPLIDAR_ULTRA,
     &Model::RPLIDAR_ULTRADENSE,
     &Model::RPLIDAR_HQ,
-    &Model::LMS200,
-    &Model::URG04LX,
+    &Model::SICK_LMS200,
+    &Model::HOKUYO_URG04LX,
     &Model::RPLIDAR_SCAN,
 ];
 
@@ -141,7 +141,7 @@ fn refine(model: &'static Model, bytes: &[u8]) -> &'static Model {
         Family::Ldrobot(_) => ldrobot_by_pace(bytes),
         Family::Delta(_) => delta_by_sector(bytes),
         Family::Camsense if bytes.windows(4).any(|w| w == [0x55, 0xaa, 0x07, 0x0c]) => {
-            &Model::LDS08RR
+            &Model::CAMSENSE_LDS08RR
         }
         Family::RplidarExpress => {
             let express = smooth_steps(
@@ -184,12 +184,12 @@ fn ldrobot_by_pace(bytes: &[u8]) -> &'static Model {
         .checked_div(elapsed_ms)
         .unwrap_or(4500)
     {
-        0..=3200 if speed < 2000 => &Model::LDS02,
-        0..=3200 => &Model::LD14,
-        3201..=4250 => &Model::LD14P,
-        4251..=4750 => &Model::LD06,
-        4751..=10_000 => &Model::STL19P,
-        _ => &Model::STL27L,
+        0..=3200 if speed < 2000 => &Model::LDROBOT_LDS02,
+        0..=3200 => &Model::LDROBOT_LD14,
+        3201..=4250 => &Model::LDROBOT_LD14P,
+        4251..=4750 => &Model::LDROBOT_LD06,
+        4751..=10_000 => &Model::LDROBOT_STL19P,
+        _ => &Model::LDROBOT_STL27L,
     }
 }
 

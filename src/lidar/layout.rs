@@ -7,7 +7,7 @@ use core::marker::PhantomData;
 
 use heapless::Vec;
 
-use super::packet::Turns;
+use super::packet::Revolutions;
 use super::timing::Pace;
 use super::{Format, Model, Packet, Parser, Reading, Verdict, View};
 use crate::scan::NoReturn;
@@ -31,7 +31,7 @@ pub trait Layout {
 #[derive(Debug, Clone)]
 pub struct Plain<Y> {
     base: View,
-    turns: Turns,
+    revolutions: Revolutions,
     layout: PhantomData<Y>,
 }
 
@@ -41,7 +41,7 @@ impl<Y: Layout, const L: usize> Parser<Plain<Y>, L> {
     pub const fn for_model(model: &Model) -> Self {
         let format = Plain {
             base: View::of(model, Y::QUALITY_SHIFT),
-            turns: Turns::new(),
+            revolutions: Revolutions::new(),
             layout: PhantomData,
         };
         Self::with_format(format, model.baud)
@@ -58,7 +58,7 @@ impl<Y: Layout> Format for Plain<Y> {
     fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Y::Packet> {
         let context = Context {
             base: self.base,
-            turns: &mut self.turns,
+            revolutions: &mut self.revolutions,
             pace,
             bytes: frame.len() as u16,
         };
@@ -71,7 +71,7 @@ impl<Y: Layout> Format for Plain<Y> {
 pub struct Context<'a> {
     /// What all packets of the model have in common.
     pub(super) base: View,
-    pub(super) turns: &'a mut Turns,
+    pub(super) revolutions: &'a mut Revolutions,
     pub(super) pace: &'a mut Pace,
     /// Bytes of the frame.
     pub(super) bytes: u16,
@@ -84,7 +84,7 @@ impl Context<'_> {
         View {
             first_us: self.pace.first_us(count, period_q8, self.bytes),
             period_q8,
-            turn_start: self.turns.find(fan.first, fan.step, count),
+            revolution_start: self.revolutions.find(fan.first, fan.step, count),
             ..self.base
         }
     }

@@ -15,7 +15,7 @@
 
 use crc::{Algorithm, Crc};
 
-use super::packet::{Turns, from_cdeg};
+use super::packet::{Revolutions, from_cdeg};
 use super::timing::{Pace, Stamps};
 use super::{Family, Model, Reading, Verdict, View};
 use crate::math::{atan2_turn, isqrt};
@@ -64,7 +64,7 @@ impl Parser {
     /// LD06, LD19.
     #[must_use]
     pub const fn new() -> Self {
-        Self::for_model(&Model::LD06)
+        Self::for_model(&Model::LDROBOT_LD06)
     }
 
     /// Any of the family.
@@ -98,7 +98,7 @@ pub struct Format {
     parallax: Parallax,
     base: View,
     stamps: Stamps,
-    turns: Turns,
+    revolutions: Revolutions,
     /// Shift of the last point that had one.
     shift: u32,
 }
@@ -112,7 +112,7 @@ impl Format {
             },
             base: View::of(model, 0),
             stamps: Stamps::new(STAMP_WRAP_MS, POINTS as u8, model.period_q8()),
-            turns: Turns::new(),
+            revolutions: Revolutions::new(),
             shift: 0,
         }
     }
@@ -165,7 +165,7 @@ impl super::Format for Format {
             view: View {
                 first_us,
                 period_q8: self.stamps.period_q8(),
-                turn_start: self.turns.find(start, step, POINTS as u16),
+                revolution_start: self.revolutions.find(start, step, POINTS as u16),
                 ..self.base
             },
             start,
@@ -193,7 +193,7 @@ pub(super) fn judge(bytes: &[u8]) -> Verdict {
 ///
 /// One of 256 damaged frames passes the CRC; this leaves one of some 10 000, and the time since the frame before
 /// nearly none. The slowest relative, 2300 points a second,
-/// would have to turn 16 times a second for 30°; the makers' tighter rule, by the reported speed, refuses the
+/// would have to spin 16 times a second for 30°; the makers' tighter rule, by the reported speed, refuses the
 /// manual's own example.
 fn is_plausible(frame: &[u8]) -> bool {
     let &[_, _, _, _, a0, a1, .., b0, b1, t0, t1, _] = frame else {
@@ -332,7 +332,7 @@ pub(super) mod tests {
         assert_eq!(last.bearing, Bearing::from_clockwise_cdeg(33_470));
         assert_eq!((first.range.mm(), first.quality), (Ok(224), 0xe4));
         assert_eq!(last.time_us - first.time_us, 11 * 1_000_000 / 4500);
-        assert_eq!(packet.turn_start(), None);
+        assert_eq!(packet.revolution_start(), None);
     }
 
     #[test]

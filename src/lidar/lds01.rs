@@ -1,4 +1,4 @@
-//! LDS-01 (HLS-LFCD2): 42-byte frames of 6 points, 60 a turn.
+//! LDS-01 (HLS-LFCD2): 42-byte frames of 6 points, 60 a revolution.
 //!
 //! Source: two independent open drivers that agree. The command `b` starts motor and stream, `e` stops both.
 //!

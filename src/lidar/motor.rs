@@ -14,7 +14,7 @@ pub struct MotorConfig {
     pub target_rpm: f32,
     /// Duty (0…1) that the motor starts with.
     pub initial_duty: f32,
-    /// Least and largest duty: less does not turn the motor, more harms it.
+    /// Least and largest duty: less does not spin the motor, more harms it.
     pub duty_range: (f32, f32),
     /// Duty per rpm of error.
     pub proportional: f32,
@@ -30,7 +30,7 @@ pub struct MotorConfig {
 
 impl MotorConfig {
     /// Neato XV-11, LDS02RR: 300 rpm; gains as commonly used, 0.003 and 0.001 every 20 ms.
-    pub const XV11: Self = Self {
+    pub const NEATO_XV11: Self = Self {
         target_rpm: 300.0,
         initial_duty: 0.55,
         duty_range: (0.2, 1.0),
@@ -43,26 +43,26 @@ impl MotorConfig {
     /// 3irobotix Delta-1A, 2A, 2B: 360 rpm.
     pub const DELTA_2A: Self = Self {
         target_rpm: 360.0,
-        ..Self::XV11
+        ..Self::NEATO_XV11
     };
-    /// RPLIDAR A1: 330 rpm. The standard scan does not tell the speed; the times of its turns do.
+    /// RPLIDAR A1: 330 rpm. The standard scan does not tell the speed; the times of its revolutions do.
     pub const RPLIDAR_A1: Self = Self {
         target_rpm: 330.0,
-        ..Self::XV11
+        ..Self::NEATO_XV11
     };
     /// YDLIDAR X2: 420 rpm.
-    pub const X2: Self = Self {
+    pub const YDLIDAR_X2: Self = Self {
         target_rpm: 420.0,
-        ..Self::XV11
+        ..Self::NEATO_XV11
     };
     /// LD06: 600 rpm at about 40 % duty.
-    pub const LD06: Self = Self {
+    pub const LDROBOT_LD06: Self = Self {
         target_rpm: 600.0,
         initial_duty: 0.4,
         proportional: 0.0005,
         integral: 0.001,
         tolerance_rpm: 30.0,
-        ..Self::XV11
+        ..Self::NEATO_XV11
     };
 }
 
@@ -266,13 +266,13 @@ mod tests {
     #[test]
     fn motors_strong_and_weak_reach_their_speed() {
         for (config, rpm_at_full) in [
-            (MotorConfig::XV11, 450.0),
-            (MotorConfig::XV11, 900.0),
+            (MotorConfig::NEATO_XV11, 450.0),
+            (MotorConfig::NEATO_XV11, 900.0),
             (MotorConfig::DELTA_2A, 600.0),
             (MotorConfig::RPLIDAR_A1, 700.0),
-            (MotorConfig::X2, 700.0),
-            (MotorConfig::LD06, 1500.0),
-            (MotorConfig::LD06, 1100.0),
+            (MotorConfig::YDLIDAR_X2, 700.0),
+            (MotorConfig::LDROBOT_LD06, 1500.0),
+            (MotorConfig::LDROBOT_LD06, 1100.0),
         ] {
             let (state, rpm) = run(config, rpm_at_full, 9);
             assert_eq!(state, Ok(MotorState::Steady), "{rpm_at_full}");
@@ -285,16 +285,16 @@ mod tests {
 
     #[test]
     fn a_motor_that_stands_or_is_too_weak_is_reported() {
-        let stands = run(MotorConfig::XV11, 0.0, 20).0;
+        let stands = run(MotorConfig::NEATO_XV11, 0.0, 20).0;
         assert_eq!(stands, Err(MotorError::SpinUp { last_rpm: 0.0 }));
-        let weak = run(MotorConfig::XV11, 200.0, 20).0;
+        let weak = run(MotorConfig::NEATO_XV11, 200.0, 20).0;
         assert!(matches!(weak, Err(MotorError::SpinUp { last_rpm }) if last_rpm > 150.0));
     }
 
     #[test]
     fn a_steady_motor_that_is_held_is_switched_off() {
         let duty = Cell::new(0);
-        let mut motor = Motor::new(Pwm(&duty), MotorConfig::XV11);
+        let mut motor = Motor::new(Pwm(&duty), MotorConfig::NEATO_XV11);
         motor.start(0).expect("no errors");
         motor.report(20_000, 300.0).expect("no errors");
         assert_eq!(motor.state(), MotorState::Steady);
@@ -314,7 +314,7 @@ mod tests {
     #[test]
     fn silence_switches_off() {
         let duty = Cell::new(0);
-        let mut motor = Motor::new(Pwm(&duty), MotorConfig::XV11);
+        let mut motor = Motor::new(Pwm(&duty), MotorConfig::NEATO_XV11);
         assert_eq!(motor.poll(0), Ok(MotorState::Off));
         motor.start(0).expect("no errors");
         motor.report(20_000, 300.0).expect("no errors");

@@ -52,8 +52,8 @@ pub struct View {
     pub counter_clockwise: bool,
     /// The quality's bits that a beam has no room for.
     pub quality_shift: u8,
-    /// Which reading is the first of a new turn, if one is.
-    pub turn_start: Option<u16>,
+    /// Which reading is the first of a new revolution, if one is.
+    pub revolution_start: Option<u16>,
     /// The line has just been lost and nothing proves that it was found again: beams without ranges.
     pub doubtful: bool,
 }
@@ -68,7 +68,7 @@ impl View {
             zero: from_cdeg(model.zero_cdeg as u32),
             counter_clockwise: model.counter_clockwise,
             quality_shift,
-            turn_start: None,
+            revolution_start: None,
             doubtful: false,
         }
     }
@@ -124,20 +124,20 @@ pub trait Packet {
         None
     }
 
-    /// Number of the beam that is the first of a new turn, if one is among them.
-    fn turn_start(&self) -> Option<usize> {
-        self.view().turn_start.map(usize::from)
+    /// Number of the beam that is the first of a new revolution, if one is among them.
+    fn revolution_start(&self) -> Option<usize> {
+        self.view().revolution_start.map(usize::from)
     }
 }
 
-/// Finds where turns begin in angles that grow steadily.
+/// Finds where revolutions begin in angles that grow steadily.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Turns {
+pub(crate) struct Revolutions {
     /// Last angle seen; 2³² is a turn.
     last: u32,
 }
 
-impl Turns {
+impl Revolutions {
     pub(crate) const fn new() -> Self {
         Self { last: 0 }
     }
@@ -217,8 +217,8 @@ mod tests {
     }
 
     #[test]
-    fn turns_are_found_between_and_within_packets() {
-        let mut turns = Turns::new();
+    fn revolutions_are_found_between_and_within_packets() {
+        let mut revolutions = Revolutions::new();
         let degree = from_cdeg(100);
         for (first, count, expected) in [
             (1000, 5, None),
@@ -229,7 +229,7 @@ mod tests {
             (9000, 4, None),
             (8000, 4, None),
         ] {
-            let found = turns.find(from_cdeg(first), degree, count);
+            let found = revolutions.find(from_cdeg(first), degree, count);
             assert_eq!(found, expected, "{first}");
         }
     }

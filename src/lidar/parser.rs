@@ -24,7 +24,7 @@ pub struct Parser<F, const L: usize> {
     pace: Pace,
     /// Bytes skipped before the last frame.
     skipped: u32,
-    turns: u32,
+    revolutions: u32,
 }
 
 impl<F: Format, const L: usize> Parser<F, L> {
@@ -36,7 +36,7 @@ impl<F: Format, const L: usize> Parser<F, L> {
             format,
             pace: Pace::new(baud),
             skipped: 0,
-            turns: 0,
+            revolutions: 0,
         }
     }
 
@@ -55,9 +55,9 @@ impl<F: Format, const L: usize> Protocol for Parser<F, L> {
         let follows = frame.skipped_bytes == self.skipped;
         self.skipped = frame.skipped_bytes;
         let packet = self.format.packet(frame.bytes, follows, &mut self.pace)?;
-        self.turns = self
-            .turns
-            .wrapping_add(u32::from(packet.view().turn_start.is_some()));
+        self.revolutions = self
+            .revolutions
+            .wrapping_add(u32::from(packet.view().revolution_start.is_some()));
         Some(packet)
     }
 
@@ -70,9 +70,9 @@ impl<F: Format, const L: usize> Protocol for Parser<F, L> {
             let Some(packet) = self.format.packet(frame.bytes, follows, &mut self.pace) else {
                 continue;
             };
-            self.turns = self
-                .turns
-                .wrapping_add(u32::from(packet.view().turn_start.is_some()));
+            self.revolutions = self
+                .revolutions
+                .wrapping_add(u32::from(packet.view().revolution_start.is_some()));
             return Some(packet);
         }
     }
@@ -87,7 +87,7 @@ impl<F: Format, const L: usize> Protocol for Parser<F, L> {
 
     fn counters(&self) -> Counters {
         Counters {
-            turns: self.turns,
+            revolutions: self.revolutions,
             ..self.framer.counters()
         }
     }

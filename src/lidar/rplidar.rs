@@ -4,7 +4,7 @@
 //!
 //! | offset | field | unit |
 //! | --- | --- | --- |
-//! | 0 | bit 0: first of a turn; bit 1: its inverse; bits 7:2 quality | |
+//! | 0 | bit 0: first of a revolution; bit 1: its inverse; bits 7:2 quality | |
 //! | 1 | bit 0: 1; with the next byte, 15 bits of angle | 1/64° clockwise |
 //! | 3 | distance, 0 for none | mm/4, `u16` LE |
 //!
@@ -86,7 +86,7 @@ impl super::Format for Format {
         Some(Packet {
             view: View {
                 first_us: pace.first_us(1, self.base.period_q8, 5),
-                turn_start: if flags & 1 == 1 { Some(0) } else { None },
+                revolution_start: if flags & 1 == 1 { Some(0) } else { None },
                 doubtful: self.good < SETTLED,
                 ..self.base
             },
@@ -159,11 +159,11 @@ mod tests {
         let mut parser = Parser::new();
         let bytes = [
             0xa5, 0x5a, 0x05, 0x00, 0x00, 0x40, 0x81, // descriptor
-            0x3d, 0x01, 0x2d, 0xa0, 0x0f, // 90°, 1000 mm, first of a turn
+            0x3d, 0x01, 0x2d, 0xa0, 0x0f, // 90°, 1000 mm, first of a revolution
         ];
         let packet = bytes.iter().find_map(|&byte| parser.push(byte));
         let packet = packet.expect("packet");
-        assert_eq!(packet.turn_start(), Some(0));
+        assert_eq!(packet.revolution_start(), Some(0));
         let sample = packet.samples().next().expect("sample");
         assert_eq!((sample.range_mm, sample.quality), (Some(1000.0), 15));
         assert!((sample.angle_deg - 90.0).abs() < 1e-3, "{sample:?}");

@@ -30,21 +30,21 @@ const NEAREST: u16 = 20;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Steps {
-    /// Steps of a turn (ARES).
-    pub per_turn: u16,
+    /// Steps of a revolution (ARES).
+    pub per_revolution: u16,
     /// Step that looks forward (AFRT).
     pub front: u16,
 }
 
 impl Steps {
-    /// URG-04LX: 1024 a turn, 44 to 725, 384 in front.
+    /// URG-04LX: 1024 a revolution, 44 to 725, 384 in front.
     pub const URG04LX: Self = Self {
-        per_turn: 1024,
+        per_revolution: 1024,
         front: 384,
     };
-    /// UTM-30LX, UST-10LX: 1440 a turn, 0 to 1080, 540 in front.
+    /// UTM-30LX, UST-10LX: 1440 a revolution, 0 to 1080, 540 in front.
     pub const UTM30LX: Self = Self {
-        per_turn: 1440,
+        per_revolution: 1440,
         front: 540,
     };
 }
@@ -132,7 +132,7 @@ impl Parser {
                 answers: 0,
                 check_errors: 0,
                 skipped_bytes: 0,
-                turns: 0,
+                revolutions: 0,
             },
         }
     }
@@ -256,16 +256,16 @@ impl Parser {
             }
         }
         self.counters.packets = self.counters.packets.wrapping_add(1);
-        self.counters.turns = self.counters.turns.wrapping_add(1);
-        let per_turn = u32::from(self.steps.per_turn);
-        let one = divided(u32::MAX, per_turn);
+        self.counters.revolutions = self.counters.revolutions.wrapping_add(1);
+        let per_revolution = u32::from(self.steps.per_revolution);
+        let one = divided(u32::MAX, per_revolution);
         let cluster = u32::from(self.scan.cluster.max(1));
         let first = i32::from(self.scan.first) - i32::from(self.steps.front);
         Some(Packet {
             view: View {
                 first_us: self.time_us,
                 period_q8: self.base.period_q8.saturating_mul(cluster),
-                turn_start: Some(0),
+                revolution_start: Some(0),
                 ..self.base
             },
             first: one.wrapping_mul(first as u32),

@@ -1,6 +1,6 @@
-//! SICK LMS200, LMS211, LMS291: telegrams with a half turn of measurements.
+//! SICK LMS200, LMS211, LMS291: telegrams with half a revolution of measurements.
 //!
-//! Source: SICK telegram listing; open drivers' check code. A rotating mirror with 75 turns a second.
+//! Source: SICK telegram listing; open drivers' check code. A rotating mirror with 75 revolutions a second.
 //!
 //! | offset | field | unit |
 //! | --- | --- | --- |
@@ -101,17 +101,19 @@ impl Layout for Telegrams {
         };
         let first = from_cdeg(start_cdeg + 25 * u32::from(partial));
         let fan = Fan::new(first, from_cdeg(step_cdeg), 2, values)?;
-        // The mirror takes 13.3 ms a turn; half degrees take two, quarter degrees four.
+        // The mirror takes 13.3 ms a revolution; half degrees take two, quarter degrees four.
         const DEGREE_Q8: u32 = 3_413_333 / 360;
-        let turns = 100 / step_cdeg as u16;
-        let first_us = context.pace.first_us(360 * turns, DEGREE_Q8, context.bytes);
+        let revolutions = 100 / step_cdeg as u16;
+        let first_us = context
+            .pace
+            .first_us(360 * revolutions, DEGREE_Q8, context.bytes);
         Some(Packet {
             answer,
             unit_q2: if header >> 14 == 1 { 4 } else { 40 },
             view: View {
                 first_us,
-                period_q8: DEGREE_Q8 / u32::from(turns),
-                turn_start: (fan.count() > 0).then_some(0),
+                period_q8: DEGREE_Q8 / u32::from(revolutions),
+                revolution_start: (fan.count() > 0).then_some(0),
                 ..context.base
             },
             fan,

@@ -48,7 +48,7 @@ pub enum Dialect {
         /// Speed of the line (bits/s).
         baud: u32,
     },
-    /// Sends as soon as it turns: LD06, X2, XV-11, Delta, Camsense.
+    /// Sends as soon as it revolutions: LD06, X2, XV-11, Delta, Camsense.
     Listen,
 }
 
@@ -155,7 +155,7 @@ pub struct StartConfig {
     pub reset_ms: u32,
     /// For the motor (ms). Default 1000.
     pub spin_up_ms: u32,
-    /// Longest silence of a stream (ms). Default 5000: some sensors send nothing before they turn steadily.
+    /// Longest silence of a stream (ms). Default 5000: some sensors send nothing before they spin steadily.
     pub stall_ms: u32,
 }
 

@@ -1,4 +1,4 @@
-//! Neato XV-11 and Xiaomi LDS02RR: 22-byte packets of 4 points, 90 a turn.
+//! Neato XV-11 and Xiaomi LDS02RR: 22-byte packets of 4 points, 90 a revolution.
 //!
 //! Source: xv11hacking wiki; checked against recordings. The host drives the motor; the data mean something between
 //! 180 and 349 rpm.

@@ -5,14 +5,14 @@
 //! | offset | field | unit |
 //! | --- | --- | --- |
 //! | 0 | `0xAA 0x55` | sync |
-//! | 2 | bit 0: first of a turn; bits 7:1 speed, valid there | 0.1 Hz |
+//! | 2 | bit 0: first of a revolution; bits 7:1 speed, valid there | 0.1 Hz |
 //! | 3 | number of samples n | |
 //! | 4 | angle of the first sample; bit 0: 1 | 1/128° clockwise, `u16` LE |
 //! | 6 | angle of the last sample; bit 0: 1 | 1/128° clockwise, `u16` LE |
 //! | 8 | XOR of the other 16-bit words; of three-byte samples the first byte is a word | `u16` LE |
 //! | 10 | n samples | |
 //!
-//! The size of a sample cannot be read from a frame; it belongs to the model. A turn starts with the frame that says so;
+//! The size of a sample cannot be read from a frame; it belongs to the model. A revolution starts with the frame that says so;
 //! where that one is lost, [`Assembler`](crate::scan::Assembler) notices.
 
 use super::packet::{divided, from_deg_q6};
@@ -43,13 +43,13 @@ pub mod command {
     pub const GET_HEALTH: u8 = 0x91;
     /// Asks for the health, by the maker's software.
     pub const GET_HEALTH_TOO: u8 = 0x92;
-    /// A tenth of a turn a second faster.
+    /// A tenth of a revolution a second faster.
     pub const FASTER: u8 = 0x09;
-    /// A tenth of a turn a second slower.
+    /// A tenth of a revolution a second slower.
     pub const SLOWER: u8 = 0x0a;
-    /// A turn a second faster.
+    /// A revolution a second faster.
     pub const MUCH_FASTER: u8 = 0x0b;
-    /// A turn a second slower.
+    /// A revolution a second slower.
     pub const MUCH_SLOWER: u8 = 0x0c;
     /// Asks for the speed.
     pub const GET_SPEED: u8 = 0x0d;
@@ -192,7 +192,7 @@ impl super::Format for Format {
             speed_dhz: begins.then_some(kind >> 1),
             view: View {
                 first_us: pace.first_us(count.into(), self.base.period_q8, frame.len() as u16),
-                turn_start: begins.then_some(0),
+                revolution_start: begins.then_some(0),
                 ..self.base
             },
             format: self.samples,
@@ -249,7 +249,7 @@ fn check_code(frame: &[u8], sample_bytes: u8) -> u16 {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet {
-    /// Speed (0.1 turns/s), where a turn starts; 0 on sensors that do not tell.
+    /// Speed (0.1 revolutions/s), where a turn starts; 0 on sensors that do not tell.
     pub speed_dhz: Option<u8>,
     view: View,
     format: Samples,

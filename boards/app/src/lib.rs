@@ -90,7 +90,7 @@ impl AppConfig {
         motor: Some(MotorConfig {
             initial_duty: 0.5,
             spin_up_ms: 5000,
-            ..MotorConfig::LD06
+            ..MotorConfig::LDROBOT_LD06
         }),
     };
 }
@@ -365,7 +365,7 @@ impl Lidar {
         self.receive(byte);
         if let Some(packet) = &self.packet {
             self.speed_deg_per_s = packet.speed_deg_per_s;
-            let start = packet.turn_start();
+            let start = packet.revolution_start();
             for (k, beam) in packet.beams().enumerate() {
                 turns.beam(beam, start == Some(k));
             }

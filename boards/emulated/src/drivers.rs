@@ -21,7 +21,7 @@ pub fn run(machine: &mut impl Machine, stack: &Stack) -> io::Result<()> {
     input.read(&mut choice)?;
     let model = Model::ALL
         .get(usize::from(choice[0]))
-        .unwrap_or(&Model::LD06);
+        .unwrap_or(&Model::LDROBOT_LD06);
     let cost = with_parser(model, Driving { input, machine })?;
     let mut output = File::create(OUTPUT)?;
     for number in cost.into_iter().chain([stack.peak()]) {

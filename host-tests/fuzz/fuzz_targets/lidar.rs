@@ -85,7 +85,7 @@ fn stream<P: Protocol>(mut parser: P, bytes: &[u8]) -> (Counters, usize) {
     let mut assembler = Assembler::<64>::new();
     let mut take = |packet: P::Packet| {
         look(&packet);
-        let start = packet.turn_start();
+        let start = packet.revolution_start();
         for (k, beam) in packet.beams().enumerate() {
             if assembler.push(beam, start == Some(k)) {
                 assert!(assembler.scan().len() <= 64);
@@ -109,7 +109,7 @@ fn stream<P: Protocol>(mut parser: P, bytes: &[u8]) -> (Counters, usize) {
 fn look(packet: &impl Packet) {
     let beams = packet.beams().count();
     assert_eq!(beams, packet.samples().count());
-    assert!(packet.turn_start().is_none_or(|start| start < beams));
+    assert!(packet.revolution_start().is_none_or(|start| start < beams));
     for sample in packet.samples() {
         assert!((0.0..360.0).contains(&sample.angle_deg), "{sample:?}");
         assert!(sample.range_mm.is_none_or(|mm| mm > 0.0), "{sample:?}");

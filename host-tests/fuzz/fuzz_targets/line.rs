@@ -63,7 +63,11 @@ fn replies(bytes: &[u8]) {
         parameters.take(b"ARES", pair);
         parameters.take(b"AMAX", bytes);
     }
-    assert!(parameters.steps().is_none_or(|steps| steps.per_turn > 0));
+    assert!(
+        parameters
+            .steps()
+            .is_none_or(|steps| steps.per_revolution > 0)
+    );
 }
 
 /// Time passes and bytes come as the input has it; an end stays one.

@@ -124,7 +124,7 @@ impl Sweep {
         let period_us = 1e6 / f64::from(model.points_per_s);
         Self {
             first: 0.123,
-            step: f64::from(model.turns_per_10s) * 1e-7 * period_us,
+            step: f64::from(model.revolutions_per_10s) * 1e-7 * period_us,
             period_us,
             beams: u64::MAX,
             sweep_us: 0.0,

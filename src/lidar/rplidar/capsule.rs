@@ -94,7 +94,7 @@ impl super::super::Format for Format {
         Some(Packet {
             view: View {
                 first_us,
-                turn_start: sweep.turn_start(points),
+                revolution_start: sweep.revolution_start(points),
                 ..self.base
             },
             packing: self.packing,
@@ -162,7 +162,7 @@ impl Sweep {
     }
 
     /// Number of the point at which the angle passes a full turn, by the SDK's rule.
-    pub(super) fn turn_start(&self, points: u16) -> Option<u16> {
+    pub(super) fn revolution_start(&self, points: u16) -> Option<u16> {
         const TURN_Q16: u32 = 360 << 16;
         let mut angle = self.first_q16;
         (0..points).find(|_| {

@@ -8,7 +8,7 @@
 //! | 1 | time | the sensor's clock, `u64` LE |
 //! | 9 + 8k | angle | 360°/65536, `u16` LE |
 //! | 11 + 8k | distance, 0 for none | mm/4, `u32` LE |
-//! | 15 + 8k | quality; bit 0: first of a turn | `u8`; `u8` |
+//! | 15 + 8k | quality; bit 0: first of a revolution | `u8`; `u8` |
 //! | 777 | CRC-32 of all before and three zeros | `u32` LE |
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
@@ -78,7 +78,7 @@ impl Layout for Frames {
             points: *points,
         };
         let starts = packet.points().position(|&[.., flag]| flag & 1 == 1);
-        packet.view.turn_start = starts.map(|k| k as u16);
+        packet.view.revolution_start = starts.map(|k| k as u16);
         Some(packet)
     }
 }

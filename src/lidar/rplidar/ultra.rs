@@ -84,7 +84,7 @@ impl super::super::Format for Format<ULTRA> {
         Some(UltraPacket {
             view: View {
                 first_us,
-                turn_start: sweep.turn_start(ULTRA_POINTS),
+                revolution_start: sweep.revolution_start(ULTRA_POINTS),
                 ..self.base
             },
             sweep,
@@ -118,7 +118,7 @@ impl super::super::Format for Format<ULTRA_DENSE> {
             status: u16::from_le_bytes([s0, s1]),
             view: View {
                 first_us,
-                turn_start: sweep.turn_start(DENSE_POINTS),
+                revolution_start: sweep.revolution_start(DENSE_POINTS),
                 ..self.base
             },
             sweep,

@@ -210,8 +210,8 @@ pub struct Parameters {
     pub nearest_mm: u16,
     /// Farthest range (mm).
     pub farthest_mm: u16,
-    /// Steps of a turn.
-    pub per_turn: u16,
+    /// Steps of a revolution.
+    pub per_revolution: u16,
     /// First step that is measured.
     pub first: u16,
     /// Last step that is measured.
@@ -228,7 +228,7 @@ impl Parameters {
         let slot = match name {
             b"DMIN" => &mut self.nearest_mm,
             b"DMAX" => &mut self.farthest_mm,
-            b"ARES" => &mut self.per_turn,
+            b"ARES" => &mut self.per_revolution,
             b"AMIN" => &mut self.first,
             b"AMAX" => &mut self.last,
             b"AFRT" => &mut self.front,
@@ -247,9 +247,10 @@ impl Parameters {
     /// How the model counts its steps, once everything needed has come.
     #[must_use]
     pub fn steps(&self) -> Option<Steps> {
-        let holds = self.per_turn > 0 && self.first < self.last && self.last <= self.per_turn;
+        let holds =
+            self.per_revolution > 0 && self.first < self.last && self.last <= self.per_revolution;
         holds.then_some(Steps {
-            per_turn: self.per_turn,
+            per_revolution: self.per_revolution,
             front: self.front,
         })
     }
@@ -289,7 +290,7 @@ mod tests {
         let expected = Parameters {
             nearest_mm: 20,
             farthest_mm: 5600,
-            per_turn: 1024,
+            per_revolution: 1024,
             first: 44,
             last: 725,
             front: 384,

@@ -59,7 +59,7 @@ impl Line {
             parameters: Parameters {
                 nearest_mm: 0,
                 farthest_mm: 0,
-                per_turn: 0,
+                per_revolution: 0,
                 first: 0,
                 last: 0,
                 front: 0,

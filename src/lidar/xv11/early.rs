@@ -1,4 +1,4 @@
-//! Neato XV-11, early firmware: a whole turn in 1446 bytes.
+//! Neato XV-11, early firmware: a whole revolution in 1446 bytes.
 //!
 //! Source: xv11hacking wiki; checked against recordings. No check code: the four bytes of the header are all there is.
 //!
@@ -13,13 +13,13 @@ use super::super::packet::from_cdeg;
 use super::super::{Layout, Reading, Verdict, View};
 use super::point;
 
-/// Bytes of a turn.
+/// Bytes of a revolution.
 pub const FRAME: usize = 1446;
 
 /// Push parser. About 1600 bytes, and as many again in each packet.
 pub type Parser = super::super::Parser<Plain<Frames>, FRAME>;
 
-/// Frames of a whole turn each.
+/// Frames of a whole revolution each.
 #[derive(Debug, Clone)]
 pub struct Frames;
 

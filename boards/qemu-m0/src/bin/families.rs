@@ -70,12 +70,12 @@ impl WithParser for Stream {
     #[inline(never)]
     fn run<P: Protocol>(self, mut parser: P) {
         let mut now_us = 0u32;
-        while parser.counters().turns != u32::MAX {
+        while parser.counters().revolutions != u32::MAX {
             parser.arrived(now_us);
             now_us = now_us.wrapping_add(87);
             let packet = parser.push(received()).or_else(|| parser.pull());
             let Some(packet) = packet else { continue };
-            let start = packet.turn_start();
+            let start = packet.revolution_start();
             for (k, beam) in packet.beams().enumerate() {
                 let [low, high] = beam.range.mm().unwrap_or(0).to_le_bytes();
                 uart::send(&[low, high, u8::from(start == Some(k)), beam.quality]);

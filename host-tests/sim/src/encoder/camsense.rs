@@ -19,7 +19,7 @@ impl Frames {
     pub fn new(model: &Model) -> Self {
         Self {
             is_wide: model.name == "lds08rr",
-            speed_rpm_q6: model.turns_per_10s * 6 * 64,
+            speed_rpm_q6: model.revolutions_per_10s * 6 * 64,
             shots: Vec::new(),
         }
     }

@@ -16,7 +16,7 @@ impl Frames {
     #[must_use]
     pub fn new(model: &Model) -> Self {
         Self {
-            speed_dhz: model.turns_per_10s.min(127) as u8,
+            speed_dhz: model.revolutions_per_10s.min(127) as u8,
             shots: Vec::new(),
         }
     }

@@ -22,7 +22,7 @@ impl Frames {
             Sector::Sixteenth => 16,
             Sector::Fifteenth => 15,
         };
-        let turns_per_s = f64::from(model.turns_per_10s) / 10.0;
+        let turns_per_s = f64::from(model.revolutions_per_10s) / 10.0;
         let points = f64::from(model.points_per_s) / turns_per_s / per_turn as f64;
         Self {
             per_turn,

@@ -72,7 +72,7 @@ impl Sensor {
     /// LD06: 4500 points and 10 turns a second.
     #[must_use]
     pub fn ld06() -> Self {
-        Self::for_model(&Model::LD06)
+        Self::for_model(&Model::LDROBOT_LD06)
     }
 
     /// Any of the family.
@@ -80,7 +80,7 @@ impl Sensor {
     pub fn for_model(model: &Model) -> Self {
         Self {
             points_per_s: model.points_per_s.into(),
-            turns_per_s: f64::from(model.turns_per_10s) / 10.0,
+            turns_per_s: f64::from(model.revolutions_per_10s) / 10.0,
             phase: 0.123,
             parallax: match model.family {
                 Family::Ldrobot(parallax) => parallax,

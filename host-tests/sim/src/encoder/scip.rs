@@ -50,12 +50,12 @@ fn encode(value: u32, width: u32) -> String {
 
 impl Wire for Scans {
     fn sweep(&self, model: &Model) -> Sweep {
-        let per_turn = f64::from(self.steps.per_turn);
-        let sweep_us = 1e7 / f64::from(model.turns_per_10s);
+        let per_revolution = f64::from(self.steps.per_revolution);
+        let sweep_us = 1e7 / f64::from(model.revolutions_per_10s);
         Sweep {
-            first: (self.first as f64 - f64::from(self.steps.front)) / per_turn,
-            step: 1.0 / per_turn,
-            period_us: sweep_us / per_turn,
+            first: (self.first as f64 - f64::from(self.steps.front)) / per_revolution,
+            step: 1.0 / per_revolution,
+            period_us: sweep_us / per_revolution,
             beams: self.last - self.first + 1,
             sweep_us,
         }

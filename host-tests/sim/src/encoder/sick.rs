@@ -36,7 +36,7 @@ fn crc(bytes: &[u8]) -> u16 {
 
 impl Wire for Scans {
     fn sweep(&self, model: &Model) -> Sweep {
-        let sweep_us = 1e7 / f64::from(model.turns_per_10s);
+        let sweep_us = 1e7 / f64::from(model.revolutions_per_10s);
         Sweep {
             first: 0.0,
             step: 1.0 / 360.0,
