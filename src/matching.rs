@@ -6,7 +6,6 @@ pub mod correlative;
 pub mod field;
 pub mod icp;
 pub mod map;
-pub mod staged;
 pub mod virtual_scan;
 
 use core::fmt;

@@ -260,7 +260,7 @@ impl<const N: usize> Odometry<N> {
             if outcome.as_ref().is_ok_and(|found| found.weak.is_none()) {
                 let motion = self.keyframe_pose.between(self.seen_from);
                 let pose = self.config.mount.lidar_motion(motion);
-                icp::fuse(&self.keyframe, self.points.as_mut_slice(), pose);
+                icp::smooth_towards(&self.keyframe, self.points.as_mut_slice(), pose);
             }
             self.keyframe.assign(self.points.as_slice());
             self.keyframe_pose = self.seen_from;

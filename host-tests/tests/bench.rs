@@ -64,7 +64,7 @@ fn pairs_are_matched_to_the_same_bits_at_no_higher_cost() {
 
 /// The rooms of `src/matching/` of which a function is in a program.
 fn rooms(elf: &Path) -> BTreeSet<&'static str> {
-    const ROOMS: [&str; 4] = ["icp", "staged", "selection", "virtual_scan"];
+    const ROOMS: [&str; 4] = ["projective", "modular", "selection", "virtual_scan"];
     let bytes = fs::read(elf).expect("an ELF file");
     let file = object::File::parse(&*bytes).expect("an ELF file");
     let names: Vec<&str> = file.symbols().filter_map(|s| s.name().ok()).collect();
@@ -91,11 +91,11 @@ fn what_is_not_chosen_costs_no_flash() {
         println!("{program}: {:?}", rooms(&elf));
         rooms(&elf)
     });
-    assert_eq!(fused, BTreeSet::from(["icp"]));
-    assert_eq!(one, BTreeSet::from(["staged"]));
+    assert_eq!(fused, BTreeSet::from(["projective"]));
+    assert_eq!(one, BTreeSet::from(["modular"]));
     // The same look finds what is there.
     assert_eq!(
         every,
-        BTreeSet::from(["staged", "selection", "virtual_scan"])
+        BTreeSet::from(["modular", "selection", "virtual_scan"])
     );
 }

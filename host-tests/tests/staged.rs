@@ -6,8 +6,7 @@ use beamfix::{
     geometry::Pose,
     matching::{
         MatchError,
-        icp::{self, IcpConfig, Reference},
-        staged::{
+        icp::modular::{
             self, Limits, Stages, Workspace,
             correspondence::{
                 BruteForce, Closest, ClosestCompatible, Correspond, NormalShooting, Projection,
@@ -23,6 +22,7 @@ use beamfix::{
                 Weigh,
             },
         },
+        icp::{self, IcpConfig, Reference},
     },
     scan::ScanPoint,
 };
@@ -73,7 +73,7 @@ where
     let (mut metres, mut degrees) = (Vec::new(), Vec::new());
     for seed in 0..SEEDS {
         let (reference, current, motion, guess) = pair(seed, 0.05, 2.0);
-        let found = staged::align(&reference, &current, guess, &mut stages, &mut workspace)
+        let found = modular::align(&reference, &current, guess, &mut stages, &mut workspace)
             .unwrap_or_else(|e| panic!("seed {seed}: {e}"));
         let off = motion.between(found.pose.into());
         metres.push(1000.0 * off.distance());
@@ -309,8 +309,8 @@ fn the_two_point_to_line_minima_are_one() {
             minimisation: Constrained,
             limits: Limits::DEFAULT,
         };
-        let a = staged::align(&reference, &current, guess, &mut newton, &mut workspace);
-        let b = staged::align(&reference, &current, guess, &mut closed, &mut workspace);
+        let a = modular::align(&reference, &current, guess, &mut newton, &mut workspace);
+        let b = modular::align(&reference, &current, guess, &mut closed, &mut workspace);
         let (a, b) = (a.expect("newton").pose, b.expect("closed").pose);
         let off = a.between(b);
         // A pair at the gate may be in for one and out for the other: a hundredth of a hundred pairs' centimetre.
@@ -335,8 +335,8 @@ fn the_fast_search_gives_the_same_bits_as_brute_force() {
             minimisation: PointToLine,
             limits: Limits::DEFAULT,
         };
-        let a = staged::align(&reference, &current, guess, &mut fast, &mut workspace);
-        let b = staged::align(&reference, &current, guess, &mut slow, &mut workspace);
+        let a = modular::align(&reference, &current, guess, &mut fast, &mut workspace);
+        let b = modular::align(&reference, &current, guess, &mut slow, &mut workspace);
         assert_eq!(a, b, "seed {seed}");
     }
 }
@@ -370,7 +370,7 @@ fn the_fused_path_is_these_stages_in_integers() {
         let a = icp::align(&lines, &current, guess, &IcpConfig::DEFAULT)
             .unwrap_or_else(|e| panic!("seed {seed}, fused: {e}"));
         // The kernel's half weight of the last pass: 32 mm · 0.64 is 21 mm, at a scale of 32 mm.
-        let b = staged::align(
+        let b = modular::align(
             &reference,
             &current,
             guess,
@@ -417,7 +417,7 @@ fn trimming_estimates_the_overlap() {
                 minimisation: PointToLine,
                 limits: Limits::DEFAULT,
             };
-            let found = staged::align(&reference, &current, guess, &mut stages, &mut workspace)
+            let found = modular::align(&reference, &current, guess, &mut stages, &mut workspace)
                 .unwrap_or_else(|e| panic!("{share}, seed {seed}: {e}"));
             let off = motion.between(found.pose.into());
             assert!(off.distance() < 0.03, "{share}, seed {seed}: {found:?}");
@@ -434,7 +434,7 @@ fn what_cannot_be_matched_is_refused() {
     let mut workspace = Box::new(Workspace::<BEAMS>::new());
     let (reference, current, _, guess) = pair(1, 0.0, 0.0);
     let mut align = |reference: &[ScanPoint], current: &[ScanPoint], guess: Pose| {
-        staged::align(reference, current, guess, &mut plain(), &mut workspace).map(|m| m.pose)
+        modular::align(reference, current, guess, &mut plain(), &mut workspace).map(|m| m.pose)
     };
     let few = Err(MatchError::TooFewBeams {
         found: 10,
@@ -466,7 +466,7 @@ fn a_corridor_is_weak_along_it_and_keeps_the_guess() {
         let motion = TruePose::new(0.1, 0.05, 0.03);
         let current = points_from(&world, motion, BEAMS, &mut noise);
         let guess = Pose::new(0.05, 0.0, 0.0);
-        let found = staged::align(
+        let found = modular::align(
             &reference,
             &current,
             guess,

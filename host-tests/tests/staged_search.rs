@@ -1,7 +1,7 @@
 //! The fast search for the closest point finds what looking at all of them finds.
 
 use beamfix::{
-    matching::staged::correspondence::nearest::{Found, Place, Sweep, brute_force},
+    matching::icp::modular::correspondence::nearest::{Found, Place, Sweep, brute_force},
     scan::{Bearing, ScanPoint},
 };
 use beamfix_sim::Noise;

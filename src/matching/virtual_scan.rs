@@ -8,7 +8,7 @@ use heapless::Vec;
 
 use crate::{
     geometry::Pose,
-    matching::staged::normals::same_surface,
+    matching::icp::modular::normals::same_surface,
     math,
     scan::{Bearing, Points, ScanPoint},
 };

@@ -4,10 +4,12 @@ use beamfix::{
     geometry::{Pose, Twist},
     matching::{
         Match, MatchError,
-        icp::{self, IcpConfig, Reference},
-        staged::{
-            self, Stages, Workspace, correspondence::Closest, minimisation::PointToLine,
-            rejection::Trimmed, selection::All, weighting::Constant,
+        icp::{
+            self, IcpConfig, Reference,
+            modular::{
+                self, Stages, Workspace, correspondence::Closest, minimisation::PointToLine,
+                rejection::Trimmed, selection::All, weighting::Constant,
+            },
         },
     },
     scan::{Points, PointsConfig, Scan},
@@ -104,7 +106,7 @@ impl<const N: usize> Matcher<N> for Staged<N> {
 
     fn align(&mut self, guess: Pose) -> Result<Match, MatchError> {
         let mut stages: Stages<All, Closest, Constant, Trimmed, PointToLine> = Stages::default();
-        staged::align(
+        modular::align(
             self.reference.as_slice(),
             self.points.as_slice(),
             guess,

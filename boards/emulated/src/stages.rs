@@ -8,7 +8,7 @@ use core::hint::black_box;
 use beamfix::{
     geometry::Pose,
     matching::{
-        staged::{
+        icp::modular::{
             self, Stages, Workspace,
             correspondence::{
                 BruteForce, Closest, ClosestCompatible, Correspond, NormalShooting, Projection,
@@ -121,9 +121,9 @@ impl Choices {
             weighting,
             rejection,
             minimisation,
-            limits: staged::Limits::DEFAULT,
+            limits: modular::Limits::DEFAULT,
         };
-        let found = staged::align(
+        let found = modular::align(
             self.seen.as_slice(),
             points,
             guess,

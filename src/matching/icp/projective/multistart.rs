@@ -4,7 +4,7 @@ use crate::{
     geometry::Pose,
     matching::{
         MatchError,
-        icp::{Search, Stepped, Task, pass::FixedPose},
+        icp::projective::{Search, Stepped, Task, accumulate::FixedPose},
     },
     math,
 };

@@ -5,10 +5,10 @@ use crate::{
     linalg::{Covariance, Information, Sym3},
     matching::{
         Match, MatchError, WeakDirection,
-        icp::{
+        icp::projective::{
             FINE, Task,
-            hypotheses::Best,
-            pass::{FixedPose, Pass},
+            accumulate::{FixedPose, Pass},
+            multistart::Best,
         },
     },
     math,

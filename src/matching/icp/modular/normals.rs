@@ -1,6 +1,6 @@
 //! The surface under each point of an ordered scan: total least squares over its neighbours.
 
-use crate::{geometry::Point, matching::staged::Cloud, math, scan::ScanPoint};
+use crate::{geometry::Point, matching::icp::modular::Cloud, math, scan::ScanPoint};
 
 /// A line through a point and its neighbours. 20 bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]

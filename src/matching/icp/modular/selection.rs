@@ -1,7 +1,7 @@
 //! First stage: which points take part.
 
 use crate::{
-    matching::staged::{Cloud, normals::Surface},
+    matching::icp::modular::{Cloud, normals::Surface},
     math,
     scan::ScanPoint,
 };
@@ -217,7 +217,7 @@ impl Select for NormalSpace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{matching::staged::normals, scan::Bearing};
+    use crate::{matching::icp::modular::normals, scan::Bearing};
 
     /// A corridor 2 m wide and 16 m long, with ends.
     fn corridor() -> [ScanPoint; 360] {

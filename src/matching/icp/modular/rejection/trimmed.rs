@@ -1,7 +1,7 @@
 //! Trimmed ICP with the overlap estimated: Chetverikov, Stepanov, Krsek, IVC 23 (2005).
 
 use crate::{
-    matching::staged::{Cloud, Pair, rejection::Reject},
+    matching::icp::modular::{Cloud, Pair, rejection::Reject},
     math,
 };
 

@@ -1,8 +1,8 @@
 //! What the reference knew, passed on: so that a chain of keyframes drifts less than its matches are noisy.
 
 use crate::{
-    matching::icp::{
-        pass::{self, FixedPose, Projection},
+    matching::icp::projective::{
+        accumulate::{self, FixedPose, Projection},
         reference::Line,
     },
     scan::{Points, ScanPoint},
@@ -13,7 +13,7 @@ const SAME: u8 = 3;
 
 /// Moves points seen from `at` along their beams, three quarters of the way to the lines that they meet: the mean of a
 /// surface as it was known and as it was seen once more.
-pub(super) fn fuse(lines: &[Line], points: &mut [ScanPoint], at: FixedPose) {
+pub(super) fn smooth_towards(lines: &[Line], points: &mut [ScanPoint], at: FixedPose) {
     let mut projection = Projection::new(lines, at);
     for point in points {
         let placed = projection.place(point);
@@ -21,7 +21,7 @@ pub(super) fn fuse(lines: &[Line], points: &mut [ScanPoint], at: FixedPose) {
             continue;
         };
         // Weighted, a distance from a line is about that along the beam.
-        let Some((beyond, _)) = pass::residual(line, placed, SAME) else {
+        let Some((beyond, _)) = accumulate::residual(line, placed, SAME) else {
             continue;
         };
         let (bx, by) = ((placed.x - at.x) >> 4, (placed.y - at.y) >> 4);
@@ -38,7 +38,7 @@ pub(super) fn fuse(lines: &[Line], points: &mut [ScanPoint], at: FixedPose) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{geometry::Pose, matching::icp::Reference, scan::Bearing};
+    use crate::{geometry::Pose, matching::icp::projective::Reference, scan::Bearing};
 
     /// What a lidar sees in the middle of a square room, its walls so far away (mm).
     fn room(wall: f32) -> [ScanPoint; 180] {
@@ -57,7 +57,7 @@ mod tests {
         for (wall, expected) in [(2020.0, 2005.0), (1980.0, 1995.0), (2100.0, 2100.0)] {
             let mut points = room(wall);
             let at = FixedPose::new(Pose::IDENTITY).expect("near");
-            fuse(reference.lines(), &mut points, at);
+            smooth_towards(reference.lines(), &mut points, at);
             for point in &points {
                 let distance = f32::from(point.x.unsigned_abs().max(point.y.unsigned_abs()));
                 // In corners lines face the lidar, and less is drawn along the beam.
@@ -78,7 +78,7 @@ mod tests {
         let pose = Pose::new(1.0, 0.0, core::f32::consts::PI);
         let at = FixedPose::new(pose).expect("near");
         let mut points = [ScanPoint::at(Bearing(0), 3012)];
-        fuse(reference.lines(), &mut points, at);
+        smooth_towards(reference.lines(), &mut points, at);
         assert!(points[0].range.abs_diff(3003) <= 2, "{points:?}");
     }
 }

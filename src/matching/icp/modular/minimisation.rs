@@ -5,7 +5,7 @@
 use crate::{
     geometry::{Point, Pose},
     linalg::Sym3,
-    matching::staged::{Cloud, Pair},
+    matching::icp::modular::{Cloud, Pair},
     math,
 };
 
@@ -249,7 +249,7 @@ impl Minimise for Constrained {
 mod tests {
     use super::*;
     use crate::{
-        matching::staged::normals::Surface,
+        matching::icp::modular::normals::Surface,
         scan::{Bearing, ScanPoint},
     };
 

@@ -5,7 +5,7 @@
 pub mod trimmed;
 
 use crate::{
-    matching::staged::{Cloud, Pair},
+    matching::icp::modular::{Cloud, Pair},
     math,
 };
 pub use trimmed::Trimmed;
@@ -205,7 +205,7 @@ mod tests {
     use super::*;
     use crate::{
         geometry::Point,
-        matching::staged::normals::Surface,
+        matching::icp::modular::normals::Surface,
         scan::{Bearing, ScanPoint},
     };
 

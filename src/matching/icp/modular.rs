@@ -1,7 +1,7 @@
 //! Iterative closest point with every stage a choice: for comparing, teaching, and scenes that want another mixture.
 //!
 //! The stages are those of Rusinkiewicz and Levoy (3DIM 2001). Each is a small trait with a type a choice; what is not
-//! chosen costs no flash. [`icp`](super::icp) is one fixed mixture in integers, made for the smallest
+//! chosen costs no flash. [`projective`](super::projective) is one fixed mixture in integers, made for the smallest
 //! boards: take it unless it lacks something.
 //!
 //! | stage | default | choices |

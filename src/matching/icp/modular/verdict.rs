@@ -1,17 +1,17 @@
-//! What a staged match is worth: enough to go by, covariance, weak direction.
+//! What a modular match is worth: enough to go by, covariance, weak direction.
 
 use crate::{
     geometry::Pose,
     linalg::{Covariance, Information, Sym3},
     matching::{
         Match, MatchError, WeakDirection,
-        staged::{Cloud, Limits, Pair, minimisation::normal_equations},
+        icp::modular::{Cloud, Limits, Pair, minimisation::normal_equations},
     },
     math,
     scan::ScanPoint,
 };
 
-/// Share of the weight below which a direction is not determined, as in `icp::quality`.
+/// Share of the weight below which a direction is not determined, as in `icp::projective::verdict`.
 const WEAK_SHARE: f32 = 0.02;
 /// Longest last step of a match that is believed (m, rad).
 const TOO_LONG: (f32, f32) = (0.01, 0.005);

@@ -1,6 +1,8 @@
 //! One pass over the points: associate by projection, weigh, sum the normal equations. The hot loop, in integers.
 
-use crate::{geometry::Pose, linalg::Sym3, matching::icp::reference::Line, math, scan::ScanPoint};
+use crate::{
+    geometry::Pose, linalg::Sym3, matching::icp::projective::reference::Line, math, scan::ScanPoint,
+};
 
 /// A pose in whole numbers: what a pass works with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 pub mod nearest;
 
-use crate::{geometry::Point, matching::staged::Cloud, math, scan::ScanPoint};
+use crate::{geometry::Point, matching::icp::modular::Cloud, math, scan::ScanPoint};
 use nearest::{Place, Sweep};
 
 /// Pairs a point with one of the reference.
@@ -219,7 +219,7 @@ impl<const B: usize> Correspond for Projection<B> {
 mod tests {
     use super::*;
     use crate::{
-        matching::staged::normals::{self, Surface},
+        matching::icp::modular::normals::{self, Surface},
         scan::Bearing,
     };
 

@@ -1,6 +1,6 @@
 //! What a scan is matched against: a line for each direction, found without a search.
 
-use crate::{matching::icp::lines, scan::ScanPoint};
+use crate::{matching::icp::projective::normals, scan::ScanPoint};
 
 /// The surface seen in one direction, as a line through a point.
 ///
@@ -84,7 +84,7 @@ impl<const N: usize> Reference<N> {
     ///
     /// The larger part of the preparation that `bench` counts.
     pub fn assign(&mut self, points: &[ScanPoint]) {
-        self.count = lines::lay(&mut self.lines, points);
+        self.count = normals::lay(&mut self.lines, points);
     }
 }
 

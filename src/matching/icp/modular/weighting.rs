@@ -5,7 +5,7 @@
 //! multiplied, and the second sees the first's.
 
 use crate::{
-    matching::staged::{Cloud, Pair},
+    matching::icp::modular::{Cloud, Pair},
     math,
 };
 
@@ -197,7 +197,7 @@ mod tests {
     use super::*;
     use crate::{
         geometry::Point,
-        matching::staged::normals::Surface,
+        matching::icp::modular::normals::Surface,
         scan::{Bearing, ScanPoint},
     };
 

@@ -1,8 +1,8 @@
 //! How well a pose explains a scan, independent of how the pose was found.
 
 use crate::{
-    matching::icp::{
-        pass::{FixedPose, Projection},
+    matching::icp::projective::{
+        accumulate::{FixedPose, Projection},
         reference::Line,
     },
     math::{reciprocal, rough_length},

@@ -1,0 +1,283 @@
+//! Iterative closest point with projection and point-to-line distances, for scans of one lidar.
+//!
+//! Six stages, as Rusinkiewicz and Levoy (3DIM 2001) name them, each in its room:
+//!
+//! | stage | here | where |
+//! | --- | --- | --- |
+//! | selection | every k-th point while coarse, all at the end | `accumulate::Pass` |
+//! | matching | projection: the line that the reference saw in the point's direction | `accumulate::Projection` |
+//! | weighting | noise of the range seen across the surface; Geman–McClure | `normals`, `accumulate` |
+//! | rejection | a gate that narrows | `accumulate` |
+//! | error metric | point to line | `accumulate` |
+//! | minimisation | Gauss–Newton, `f32` | [`Sym3::solve`](crate::linalg::Sym3::solve) |
+//!
+//! What a pose is worth is judged apart from how it was found (`score`), so that several starts can compete.
+
+mod accumulate;
+mod multistart;
+mod normals;
+pub mod reference;
+mod score;
+mod smoothing;
+mod verdict;
+
+pub use reference::{Line, Reference};
+
+use crate::{
+    geometry::Pose,
+    matching::{Match, MatchError},
+    scan::ScanPoint,
+};
+use accumulate::{FixedPose, Pass, Sums};
+use multistart::Candidate;
+
+/// How far the guess may be off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Search {
+    /// By a few centimetres and degrees: odometry. The guess alone is tried first, and others only if it fails. What is
+    /// found far from the guess (0.75 m, a turn counted at 3 m) must explain more of the scan, and is refused as
+    /// ambiguous where another pose explains nearly as much.
+    #[default]
+    Local,
+    /// By 40 cm and 45°, or not there at all: always a bounded number of starts around it.
+    Global,
+}
+
+/// Settings of [`align`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct IcpConfig {
+    /// How far the guess may be off. Default [`Search::Local`].
+    pub search: Search,
+    /// Beams in a coarse pass; all are used in the last two. Default 45: the accuracy that fewer cost is won back by
+    /// the last passes.
+    pub coarse_beams: u16,
+    /// Fewest beams that must agree with the reference. Default 30.
+    pub min_inliers: u16,
+    /// Worst score that is accepted, from 0 (nothing agrees) to 1. Default 0.25: on recorded pairs no right
+    /// pose had less than 0.3.
+    pub min_score: f32,
+    /// Standard deviation of a range (m): the least noise that the covariance assumes. Default 0.005.
+    pub range_sigma: f32,
+    /// A direction is weak that less than this share of the beams tell. Default 0.02: what the noise of the normals alone
+    /// amounts to in a corridor.
+    pub weak_share: f32,
+}
+
+impl IcpConfig {
+    /// For odometry with a cheap lidar.
+    pub const DEFAULT: Self = Self {
+        search: Search::Local,
+        coarse_beams: 45,
+        min_inliers: 30,
+        min_score: 0.25,
+        range_sigma: 0.005,
+        weak_share: 0.02,
+    };
+}
+
+impl Default for IcpConfig {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// Gate of the first coarse pass (see [`Pass::gate`]), and most of them.
+const COARSE_FIRST: u8 = 9;
+const COARSE_MOST: u8 = 16;
+/// A step that is this short compared with the gate narrows it by two, or by one.
+const SHORT: f32 = 1.0 / 16.0;
+const MEDIUM: f32 = 1.0 / 4.0;
+/// Gate of the fine passes, into how many parts they divide the points, points of a part in a row, and most passes.
+const FINE: u8 = 5;
+const PARTS: u16 = 2;
+const PART: u16 = 8;
+const FINE_MOST: u8 = 16;
+/// A step this short (m) leaves the points on their lines.
+const STILL: f32 = 0.014;
+
+/// Pose of the lidar that saw `points` in the frame of the one that saw `reference`.
+///
+/// `guess` is where the search starts and what the result keeps along a direction that the scene does not determine.
+///
+/// # Errors
+/// Refuses rather than gives a wrong pose: see [`MatchError`].
+pub fn align<const N: usize>(
+    reference: &Reference<N>,
+    points: &[ScanPoint],
+    guess: Pose,
+    config: &IcpConfig,
+) -> Result<Match, MatchError> {
+    align_observed(reference, points, guess, config, |_| ())
+}
+
+/// As [`align`], showing the estimate after every pass: for pictures and for learning what a match does.
+///
+/// # Errors
+/// As [`align`].
+pub fn align_observed<const N: usize>(
+    reference: &Reference<N>,
+    points: &[ScanPoint],
+    guess: Pose,
+    config: &IcpConfig,
+    mut observe: impl FnMut(Pose),
+) -> Result<Match, MatchError> {
+    let needed = config.min_inliers;
+    if points.len() < usize::from(needed) {
+        let found = points.len() as u16;
+        return Err(MatchError::TooFewBeams { found, needed });
+    }
+    if reference.len() < needed {
+        let found = reference.len();
+        return Err(MatchError::TooFewLines { found, needed });
+    }
+    let start = FixedPose::new(guess).ok_or(MatchError::BadGuess)?;
+    let task = Task {
+        lines: reference.lines(),
+        points,
+        start,
+        lever_shift: accumulate::lever_shift(points, start),
+        config,
+    };
+    let best = multistart::search(&task, &mut observe)?;
+    verdict::verdict(&task, &best, guess)
+}
+
+/// Moves `points`, seen at `pose` in the reference's frame, towards the surfaces that the reference saw there, if they are
+/// less than 32 mm off: laid as the next reference, they know what this one knew.
+///
+/// For poses of matches without a weak direction: along one, surfaces would be passed on to the wrong place. Costs a pass
+/// over the points; at a pose that is not finite or more than 27 m away they stay as they are.
+pub fn smooth_towards<const N: usize>(
+    reference: &Reference<N>,
+    points: &mut [ScanPoint],
+    pose: Pose,
+) {
+    if let Some(at) = FixedPose::new(pose) {
+        smoothing::smooth_towards(reference.lines(), points, at);
+    }
+}
+
+/// A pass and the step it led to.
+struct Stepped {
+    at: FixedPose,
+    sums: Sums,
+    /// Length of the step (m): see [`accumulate::length`].
+    length: f32,
+}
+
+/// What stays the same over one match.
+struct Task<'a> {
+    lines: &'a [Line],
+    points: &'a [ScanPoint],
+    start: FixedPose,
+    lever_shift: u32,
+    config: &'a IcpConfig,
+}
+
+impl Task<'_> {
+    /// A pass, what earlier ones knew, and the Gauss–Newton step of both.
+    fn step(
+        &self,
+        at: FixedPose,
+        pass: Pass,
+        earlier: Option<&Sums>,
+    ) -> Result<Stepped, MatchError> {
+        let mut sums = accumulate::run(self.lines, self.points, at, self.lever_shift, pass);
+        // Half of the share of the points that the pass looked at.
+        let needed = self.config.min_inliers * pass.length / pass.period.max(1) / 2;
+        if sums.inliers < needed {
+            let found = sums.inliers;
+            return Err(MatchError::TooFewCorrespondences { found, needed });
+        }
+        if let Some(earlier) = earlier {
+            sums.remember(earlier);
+        }
+        let step = sums.step(self.lever_shift).ok_or(MatchError::Degenerate)?;
+        Ok(Stepped {
+            at: at.moved(step, self.start),
+            sums,
+            length: accumulate::length(step),
+        })
+    }
+
+    /// From a start to a candidate: coarse passes whose gate narrows as their steps get shorter, then the score.
+    fn coarse(
+        &self,
+        start: FixedPose,
+        observe: &mut impl FnMut(Pose),
+    ) -> Result<Candidate, MatchError> {
+        let beams = self.config.coarse_beams.max(1);
+        let period = (self.points.len() as u16).div_ceil(beams).max(1);
+        let mut at = start;
+        let mut gate = COARSE_FIRST;
+        let mut passes = 0;
+        while gate > FINE && passes < COARSE_MOST {
+            let pass = Pass {
+                period,
+                // Another set of points each time.
+                first: u16::from(passes) % period,
+                length: 1,
+                gate,
+            };
+            let stepped = self.step(at, pass, None)?;
+            at = stepped.at;
+            observe(at.pose());
+            passes += 1;
+            let width = f32::from(4u16 << gate) * 1e-3;
+            if stepped.length < width * SHORT {
+                gate -= 2;
+            } else if stepped.length < width * MEDIUM {
+                gate -= 1;
+            }
+        }
+        Ok(self.judged(at, passes))
+    }
+
+    /// From a candidate to the pose: passes over a part of the points each, which share what they know, until all
+    /// parts have been taken in without a long step.
+    fn fine(
+        &self,
+        start: FixedPose,
+        observe: &mut impl FnMut(Pose),
+    ) -> Result<(Stepped, u8), MatchError> {
+        let mut state: Option<Stepped> = None;
+        let mut at = start;
+        let (mut part, mut passes) = (0, 0);
+        loop {
+            let pass = Pass {
+                period: PART * PARTS,
+                first: PART * (part % PARTS),
+                length: PART,
+                gate: FINE,
+            };
+            let earlier = state.as_ref().map(|state| &state.sums);
+            let stepped = self.step(at, pass, earlier)?;
+            at = stepped.at;
+            observe(at.pose());
+            passes += 1;
+            part += 1;
+            if part >= PARTS || passes >= FINE_MOST {
+                return Ok((stepped, passes));
+            }
+            // After a long step other lines are met: what was known before is worth nothing.
+            state = (stepped.length < STILL).then_some(stepped);
+            if state.is_none() {
+                part = 0;
+            }
+        }
+    }
+
+    fn judged(&self, at: FixedPose, passes: u8) -> Candidate {
+        let stride = (self.points.len() as u16)
+            .div_ceil(self.config.coarse_beams.max(1))
+            .max(1);
+        let score = score::judge(self.lines, self.points, at, stride);
+        Candidate {
+            at,
+            passes,
+            overlap: score.overlap.saturating_mul(stride),
+            value: score.value(20 / stride),
+        }
+    }
+}
