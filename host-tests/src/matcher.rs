@@ -30,7 +30,7 @@ impl<const N: usize> Matcher<N> {
     }
 
     /// Matches a pair; `observe` is shown the estimate after every pass.
-    // A function of its own, so that its instructions can be counted: `tests/host_cost.rs`.
+    // A function of its own, so that its instructions can be counted: `tests/matching/host_cost.rs`.
     #[inline(never)]
     pub fn run(
         &mut self,

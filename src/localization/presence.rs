@@ -1,7 +1,7 @@
 //! Whether a known object, such as a charging dock, stands where it may stand, and exactly where.
 //!
 //! Its likelihood field is the map: all cells around it explored, so that beams that end in its shape's hollows or
-//! go through its faces speak against it. Measured in `host-tests/tests/field_presence.rs`, in the simulated home
+//! go through its faces speak against it. Measured in `host-tests/tests/maps/presence.rs`, in the simulated home
 //! with a dock of 0.7 m looked for from 0.6 to 2 m: no alarm in 3000 scans without one (a rate below 0.1 % at 95 %
 //! confidence), and 212 of 220 docks found, all within 3 cm.
 

@@ -113,7 +113,7 @@ const RATE: f64 = 10.0;
 /// Bytes a second that it sends.
 const BYTES: f64 = 17_625.0;
 /// Instructions that a byte takes besides the median match: interrupt, ring, parser, telemetry, and its share of the longer
-/// matches. So many are left of the cycles that the Pico is awake in rp2040js (25 % in `host-tests/tests/boards_uart.rs`).
+/// matches. So many are left of the cycles that the Pico is awake in rp2040js (25 % in `host-tests/tests/boards/uart.rs`).
 const BYTE: f64 = 600.0;
 /// The same with embassy, whose task is woken for each byte or two (38 % there).
 const BYTE_BY_AWAIT: f64 = 1250.0;

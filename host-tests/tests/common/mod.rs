@@ -5,8 +5,6 @@ pub mod cable;
 pub mod figures;
 pub mod tool;
 
-use std::path::{Path, PathBuf};
-
 use beamfix::{
     geometry::{Pose, Twist},
     grid::Shape,
@@ -18,20 +16,7 @@ use beamfix::{
 };
 use beamfix_sim::{lidar::Still, noise::Noise, pose::TruePose, world::World};
 use host_tests::readers::pairs::{self, Pair};
-
-/// A file among the shared data; says so where it is missing.
-pub fn shared(file: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("BEAMFIX_SHARED").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
-        PathBuf::from,
-    );
-    let path = folder.join(file);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("left out: {} is not there", path.display());
-    None
-}
+use host_tests::shared;
 
 /// The points of a scan taken at one moment.
 pub fn points_of(beams: &[Beam]) -> Vec<ScanPoint> {
@@ -104,8 +89,8 @@ pub fn over_pairs(
     level: i32,
     align: impl Fn(&Pair, &[ScanPoint], &[ScanPoint]) -> Option<Pose>,
 ) -> Option<[f64; 4]> {
-    let scans = shared("pairs/host/scans_sim.txt.gz")?;
-    let list = shared("pairs/host/pairs_sim_consec.csv.gz")?;
+    let scans = shared::file("pairs/host/scans_sim.txt.gz")?;
+    let list = shared::file("pairs/host/pairs_sim_consec.csv.gz")?;
     let pairs = pairs::read(&scans, &list).expect("a list");
     let [mut count, mut right, mut metres, mut degrees] = [0.0; 4];
     for pair in pairs.pairs.iter().filter(|p| p.level == level) {

@@ -1,7 +1,6 @@
 //! A charging dock: found where it stands, not seen where there is none.
 
-mod common;
-
+use crate::common::points_from;
 use beamfix::{
     geometry::{Point, Pose},
     grid::Shape,
@@ -10,7 +9,6 @@ use beamfix::{
     sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile, stamp::Canvas},
 };
 use beamfix_sim::{home, noise::Noise, pose::TruePose, world::World};
-use common::points_from;
 use host_tests::map_file;
 
 /// The front of a dock, 0.7 m wide, with a notch 0.12 m deep: x forward, out of the dock.

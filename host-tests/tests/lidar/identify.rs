@@ -3,10 +3,9 @@
 use beamfix::lidar::identify::{Hint, hints, identify};
 use beamfix::lidar::{Family, Model};
 use beamfix_sim::encoder::{self, Echo, damage};
+use host_tests::shared;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-mod common;
 
 /// About a second of a sensor's bytes in a room.
 fn second(model: &Model) -> Vec<u8> {
@@ -91,7 +90,7 @@ fn every_capture_is_recognised() {
         ("doc-ld06-frame.bin", Model::LDROBOT_LD06),
         ("doc-delta-2a-frame.bin", Model::DELTA_2A),
     ] {
-        let Some(path) = common::shared(&format!("datasets/serial/{file}")) else {
+        let Some(path) = shared::file(&format!("datasets/serial/{file}")) else {
             continue;
         };
         let bytes = std::fs::read(path).expect("readable");
@@ -150,7 +149,7 @@ fn plain_words_where_something_is_wrong() {
 
 #[test]
 fn flow_control_in_the_recording_is_noticed() {
-    let Some(path) = common::shared("datasets/serial/ld19-20240828.bin") else {
+    let Some(path) = shared::file("datasets/serial/ld19-20240828.bin") else {
         return;
     };
     let bytes = std::fs::read(path).expect("readable");

@@ -1,13 +1,11 @@
 //! The firmware in the emulator against the same application here.
 
-use std::path::{Path, PathBuf};
-
 use beamfix_app::{BEAMS, telemetry::Telemetry};
 use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::{Echo, Encoder as _, damage, ld06::Sensor};
 use host_tests::{
     board::{BOARDS, Replay, difference, emulator::Count, recording::Recording, stream},
-    readers,
+    readers, shared,
 };
 
 /// Bytes of an LD06 that stands in a square room, 8 m wide, with a door open, and turns by a degree a second.
@@ -73,15 +71,9 @@ fn every_board_streams_the_same_bits() {
     ignore = "once is enough: the firmware is always a release build"
 )]
 fn every_board_replays_a_real_log_to_the_same_bits() {
-    let shared = std::env::var_os("BEAMFIX_SHARED").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
-        PathBuf::from,
-    );
-    let log = shared.join("datasets/logs/intel.lscan");
-    if !log.exists() {
-        println!("left out: {} is not there", log.display());
+    let Some(log) = shared::file("datasets/logs/intel.lscan") else {
         return;
-    }
+    };
     let log = readers::read(&log).unwrap_or_else(|error| panic!("{error:#}"));
     let recording = Recording::of_log(&log.scans[..1000]);
     for board in BOARDS {

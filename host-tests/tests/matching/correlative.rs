@@ -1,7 +1,6 @@
 //! Branch and bound against trying every pose; how far off a guess may be; what is ambiguous or undetermined.
 
-mod common;
-
+use crate::common::{field_of, over_pairs, points_from};
 use beamfix::{
     geometry::Pose,
     grid::{Grid, Shape},
@@ -14,7 +13,6 @@ use beamfix::{
     sensor_model::likelihood_field::{Field, FieldModel, LikelihoodField},
 };
 use beamfix_sim::{noise::Noise, pose::TruePose, scenes};
-use common::{field_of, over_pairs, points_from};
 
 /// A field with smooth bumps, what is unexplored, and noise.
 fn random_field(noise: &mut Noise) -> LikelihoodField<Vec<u8>> {
@@ -214,7 +212,7 @@ fn a_corridor_is_weak_along_itself_and_two_equal_rooms_are_ambiguous() {
     let place = TruePose::new(1.0, 1.2, 0.4);
     let points = points_from(&rooms, place, 360, &mut noise);
     let field =
-        common::field_of_world(&rooms, [-0.5, -0.5], [7.5, 3.5], 0.05, &FieldModel::DEFAULT);
+        crate::common::field_of_world(&rooms, [-0.5, -0.5], [7.5, 3.5], 0.05, &FieldModel::DEFAULT);
     let mut buffer = vec![0; Pyramid::bytes(field.grid().shape())];
     let pyramid = Pyramid::new(field.as_slice(), &mut buffer).expect("fits");
     let config = CorrelativeConfig {
@@ -235,7 +233,7 @@ fn a_corridor_is_weak_along_itself_and_two_equal_rooms_are_ambiguous() {
     rooms.block([2.2, 0.0], [2.6, 0.6]);
     let points = points_from(&rooms, place, 360, &mut noise);
     let field =
-        common::field_of_world(&rooms, [-0.5, -0.5], [7.5, 3.5], 0.05, &FieldModel::DEFAULT);
+        crate::common::field_of_world(&rooms, [-0.5, -0.5], [7.5, 3.5], 0.05, &FieldModel::DEFAULT);
     let pyramid = Pyramid::new(field.as_slice(), &mut buffer).expect("fits");
     let found = correlator
         .align(&pyramid, &points, guess, &config)

@@ -5,21 +5,19 @@
 //! no limit is on how long things take. What the watchdog does is tried with the Pico's own firmware in rp2040js, where time
 //! is simulated too.
 
-mod common;
-
 use std::{
     io::Write as _,
     thread,
     time::{Duration, Instant},
 };
 
+use crate::common::cable::{Cable, PACKET_US};
 use beamfix::lidar::ld06::{FRAME, check_code};
 use beamfix_app::{
     link::Receiver,
     telemetry::{Health, LidarState, MotorState, Pose, Reset, Telemetry},
 };
 use beamfix_sim::noise::Noise;
-use common::cable::{Cable, PACKET_US};
 use host_tests::board::{
     BOARDS,
     recording::Recording,

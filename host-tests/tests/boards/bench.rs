@@ -1,10 +1,8 @@
 //! One match on the emulated boards: the host's bits, and no more instructions than before. What is not chosen costs no flash.
 
-mod common;
-
 use std::{collections::BTreeSet, fs, path::Path};
 
-use common::figures::Risen;
+use crate::common::figures::Risen;
 use host_tests::board::{
     Board,
     bench::{self, Figures, Outcome},
@@ -30,7 +28,7 @@ fn poses(outcomes: &[Outcome]) -> Vec<(bool, [u32; 3])> {
 )]
 fn pairs_are_matched_to_the_same_bits_at_no_higher_cost() {
     let golden: Vec<Figures> =
-        serde_json::from_str(include_str!("../golden/bench.json")).expect("a list of figures");
+        serde_json::from_str(include_str!("../../golden/bench.json")).expect("a list of figures");
     let list = bench::simulated();
     let mut risen = Risen::default();
     for (name, which) in bench::ALL {

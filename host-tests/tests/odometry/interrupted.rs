@@ -1,15 +1,13 @@
 //! A lidar that does not see the robot's surroundings for a while: its cable is pulled out or has a loose contact, or
 //! somebody stands before it. The application's poses afterwards, for every point of a turn at which that may begin.
 
-mod common;
-
+use crate::common::cable::{Cable, PACKET_US};
 use beamfix::lidar::ld06::{FRAME, check_code};
 use beamfix_app::{
     BEAMS,
     link::Receiver,
     telemetry::{Pose, Telemetry},
 };
-use common::cable::{Cable, PACKET_US};
 use host_tests::board::Here;
 
 /// Packets of a turn of the lidar, nearly.

@@ -1,12 +1,10 @@
 //! Matching against likelihood fields: accuracy on pairs with known motion.
 
-mod common;
-
+use crate::common::{field_of, over_pairs};
 use beamfix::{
     matching::field::{self, FieldConfig},
     sensor_model::likelihood_field::FieldModel,
 };
-use common::{field_of, over_pairs};
 
 #[test]
 fn scan_to_field_is_as_exact_as_the_scans_allow() {

@@ -1,7 +1,6 @@
 //! Every choice of every stage of ICP finds a known motion; what each is worth.
 
-mod common;
-
+use crate::common::points_from;
 use beamfix::{
     geometry::Pose,
     matching::{
@@ -27,7 +26,6 @@ use beamfix::{
     scan::ScanPoint,
 };
 use beamfix_sim::{Noise, TruePose, scenes};
-use common::points_from;
 
 const BEAMS: usize = 360;
 const SEEDS: u64 = 20;

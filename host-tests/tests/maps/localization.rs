@@ -1,7 +1,6 @@
 //! Finding oneself, noticing that one is lost, and tracking with people in the way, in a simulated home.
 
-mod common;
-
+use crate::common::points_of;
 use beamfix::{
     geometry::Pose,
     localization::{Localizer, LocalizerConfig, Verdict},
@@ -10,7 +9,6 @@ use beamfix::{
     sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile},
 };
 use beamfix_sim::{home, lidar::Still, noise::Noise, pose::TruePose, world::World};
-use common::points_of;
 use host_tests::map_file::{self, Map};
 
 const BEAMS: usize = 450;

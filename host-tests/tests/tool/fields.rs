@@ -1,16 +1,11 @@
 //! `field`, `learn` and `replay --mode localize` as they are called.
 
-mod common;
-
 use std::fs;
 
+use crate::common::tool::{beamfix, folder, text};
 use beamfix::sensor_model::likelihood_field::stored;
 use beamfix_sim::home;
-use common::{
-    shared,
-    tool::{beamfix, folder, text},
-};
-use host_tests::map_file;
+use host_tests::{map_file, shared};
 
 #[test]
 fn a_map_becomes_a_table_for_flash() {
@@ -71,8 +66,8 @@ fn a_bad_map_ends_with_one_line_and_status_2() {
 #[test]
 fn intel_is_learned_from_and_localized_in() {
     let (Some(corrected), Some(raw)) = (
-        shared("datasets/logs/intel-corrected.log.gz"),
-        shared("datasets/logs/intel.log.gz"),
+        shared::file("datasets/logs/intel-corrected.log.gz"),
+        shared::file("datasets/logs/intel.log.gz"),
     ) else {
         return;
     };

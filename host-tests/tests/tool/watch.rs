@@ -1,14 +1,12 @@
 //! `watch`: an emulated board is followed live, drawn, and recorded; the recording replays to the same bits.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
+use crate::common::tool::{beamfix, folder, json, text};
 use beamfix_app::{App, AppConfig, CONFIG, telemetry::Reset};
 use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::ld06::Sensor;
-use common::tool::{beamfix, folder, json, text};
 
 /// PNG, and large enough to hold a drawing.
 fn is_picture(path: &Path) {

@@ -1,11 +1,9 @@
 //! Every lidar on the simulated robot: bytes, driver, odometry, pose.
 
-mod common;
-
 use std::path::Path;
 
+use crate::common::tool::{beamfix, json, text};
 use beamfix::lidar::Model;
-use common::tool::{beamfix, json, text};
 
 /// Drives every lidar for a minute; each may end so far off (m, °).
 fn all_drive(prior: &str, allowed: (f64, f64)) {

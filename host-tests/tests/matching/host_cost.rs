@@ -1,14 +1,12 @@
 //! Instructions of a match on the host, counted by callgrind.
 
-mod common;
-
 use std::{
     fs,
     process::{Command, Stdio},
 };
 
-use common::shared;
 use host_tests::readers::bytes;
+use host_tests::shared;
 
 /// Most instructions a match, from the beams of both scans to the pose.
 const ALLOWED: u64 = 300_000;
@@ -18,8 +16,8 @@ const ALLOWED: u64 = 300_000;
 #[cfg_attr(debug_assertions, ignore = "a debug build counts other things")]
 fn a_match_of_180_beams_costs_at_most_300_000_instructions() {
     let (Some(scans), Some(list)) = (
-        shared("pairs/host/scans_intel.txt.gz"),
-        shared("pairs/host/pairs_intel_cons.csv.gz"),
+        shared::file("pairs/host/scans_intel.txt.gz"),
+        shared::file("pairs/host/pairs_intel_cons.csv.gz"),
     ) else {
         return;
     };

@@ -1,14 +1,12 @@
 //! The tool as scripts meet it: exit statuses, one clear line for a bad file, one JSON object.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 use std::process::Output;
 
+use crate::common::tool::{beamfix, folder, json};
 use beamfix_sim::encoder::ld06::Sensor;
 use beamfix_sim::{Noise, Settings, Still, TruePose, drive, scenes};
-use common::tool::{beamfix, folder, json};
 use flate2::{Compression, write::GzEncoder};
 use serde_json::Value;
 use std::io::Write;

@@ -4,9 +4,9 @@ use host_tests::board::{card::Card, real::RealCard};
 
 #[test]
 fn the_cost_table_is_that_of_the_golden_cards() {
-    let readme = include_str!("../../README.md");
+    let readme = include_str!("../../../README.md");
     let cards: Vec<Card> =
-        serde_json::from_str(include_str!("../golden/card.json")).expect("a list of cards");
+        serde_json::from_str(include_str!("../../golden/card.json")).expect("a list of cards");
     for card in cards {
         let row = card.markdown();
         assert!(readme.contains(&row), "README.md lacks the row\n{row}");
@@ -15,11 +15,11 @@ fn the_cost_table_is_that_of_the_golden_cards() {
 
 #[test]
 fn the_table_of_boards_is_what_was_measured() {
-    let readme = include_str!("../../README.md");
+    let readme = include_str!("../../../README.md");
     let boards: Vec<RealCard> =
-        serde_json::from_str(include_str!("../golden/boards.json")).expect("a list of cards");
+        serde_json::from_str(include_str!("../../golden/boards.json")).expect("a list of cards");
     let cards: Vec<Card> =
-        serde_json::from_str(include_str!("../golden/card.json")).expect("a list of cards");
+        serde_json::from_str(include_str!("../../golden/card.json")).expect("a list of cards");
     for board in boards {
         let row = board.markdown();
         assert!(readme.contains(&row), "README.md lacks the row\n{row}");

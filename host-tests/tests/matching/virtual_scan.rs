@@ -1,7 +1,6 @@
 //! Scan to a virtual scan of several keyframes: nearer to the truth than scan to scan, and past what one scan hides.
 
-mod common;
-
+use crate::common::points_from;
 use beamfix::{
     geometry::Pose,
     matching::{
@@ -11,7 +10,6 @@ use beamfix::{
     scan::ScanPoint,
 };
 use beamfix_sim::{Noise, TruePose, World, scenes};
-use common::points_from;
 
 const BEAMS: usize = 360;
 

@@ -1,7 +1,6 @@
 //! Scenes that do not determine a pose, or deceive: each test says which verdict is expected.
 
-mod common;
-
+use crate::common::{points_from, points_of};
 use beamfix::{
     geometry::Pose,
     matching::{
@@ -11,7 +10,6 @@ use beamfix::{
     scan::{Beam, Range, ScanPoint},
 };
 use beamfix_sim::{Noise, Still, TruePose, World, scenes};
-use common::{points_from, points_of};
 
 const BEAMS: usize = 360;
 const SEEDS: u64 = 50;

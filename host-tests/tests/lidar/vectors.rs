@@ -10,11 +10,10 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
-mod common;
-use common::shared;
+use host_tests::shared;
 
 fn vectors(family: &str) -> Vec<Value> {
-    let Some(path) = shared(&format!("vectors/{family}.json")) else {
+    let Some(path) = shared::file(&format!("vectors/{family}.json")) else {
         return Vec::new();
     };
     let text = std::fs::read_to_string(path).expect("readable");
@@ -24,7 +23,7 @@ fn vectors(family: &str) -> Vec<Value> {
 
 fn bytes(vector: &Value) -> Vec<u8> {
     if let Some(file) = vector["file"].as_str() {
-        let path = shared(&format!("vectors/{file}")).expect("file of the vector");
+        let path = shared::file(&format!("vectors/{file}")).expect("file of the vector");
         return std::fs::read(path).expect("readable");
     }
     let hex = vector["bytes_hex"].as_str().expect("bytes_hex").as_bytes();
@@ -553,7 +552,7 @@ fn captures() {
         ("doc-ld06-frame.bin", "ld06", 1, 12, 0, 0, 0, 0),
         ("doc-delta-2a-frame.bin", "delta-2a", 1, 47, 5, 0, 0, 0),
     ] {
-        let Some(path) = shared(&format!("datasets/serial/{file}")) else {
+        let Some(path) = shared::file(&format!("datasets/serial/{file}")) else {
             continue;
         };
         let bytes = std::fs::read(path).expect("readable");
@@ -592,7 +591,7 @@ fn rplidar_rooms() {
         ("rplidar-a1-room-0003.bin", 1322, 2073, 7),
         ("rplidar-a1-room-0004.bin", 292, 1958, 7),
     ] {
-        let Some(path) = shared(&format!("datasets/serial/{file}")) else {
+        let Some(path) = shared::file(&format!("datasets/serial/{file}")) else {
             continue;
         };
         let bytes = std::fs::read(path).expect("readable");
@@ -606,8 +605,8 @@ fn rplidar_rooms() {
 #[test]
 fn express_capsules_as_the_makers_sdk() {
     let (Some(capsules), Some(nodes)) = (
-        shared("datasets/serial/rplidar-express-capsules.bin"),
-        shared("datasets/serial/rplidar-express-capsules.nodes.txt"),
+        shared::file("datasets/serial/rplidar-express-capsules.bin"),
+        shared::file("datasets/serial/rplidar-express-capsules.nodes.txt"),
     ) else {
         return;
     };

@@ -1,8 +1,6 @@
 //! What the firmware takes on the emulated boards must not rise unnoticed.
 
-mod common;
-
-use common::figures::Risen;
+use crate::common::figures::Risen;
 use host_tests::board::{
     BOARDS,
     card::{Card, measure, recording},
@@ -16,7 +14,7 @@ use host_tests::board::{
 )]
 fn no_figure_rises() {
     let golden: Vec<Card> =
-        serde_json::from_str(include_str!("../golden/card.json")).expect("a list of cards");
+        serde_json::from_str(include_str!("../../golden/card.json")).expect("a list of cards");
     let recording = recording();
     let mut risen = Risen::default();
     for board in BOARDS {
@@ -63,9 +61,9 @@ fn no_figure_rises() {
 )]
 fn no_firmware_of_a_real_board_grows() {
     let cores: Vec<Card> =
-        serde_json::from_str(include_str!("../golden/card.json")).expect("a list of cards");
+        serde_json::from_str(include_str!("../../golden/card.json")).expect("a list of cards");
     let golden: Vec<RealCard> =
-        serde_json::from_str(include_str!("../golden/boards.json")).expect("a list of cards");
+        serde_json::from_str(include_str!("../../golden/boards.json")).expect("a list of cards");
     assert_eq!(golden.len(), REAL.len());
     let mut risen = Risen::default();
     for (board, before) in REAL.iter().zip(&golden) {

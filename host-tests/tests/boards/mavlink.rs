@@ -47,7 +47,7 @@ fn parsed(python: &Path, name: &str, bytes: &[u8]) -> Vec<Value> {
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     fs::write(&file, bytes).expect("the test's file");
     let output = Command::new(python)
-        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mavlink.py"))
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/boards/mavlink.py"))
         .arg(&file)
         .output()
         .expect("python starts");

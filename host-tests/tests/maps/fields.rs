@@ -1,9 +1,8 @@
 //! Fields from rolling tiles, local maps matched with maps, and map files good and bad.
 
-mod common;
-
 use std::{fs, path::PathBuf};
 
+use crate::common::points_from;
 use beamfix::{
     geometry::{Point, Pose},
     grid::{
@@ -21,7 +20,6 @@ use beamfix::{
     },
 };
 use beamfix_sim::{home, noise::Noise, pose::TruePose, scenes};
-use common::points_from;
 use host_tests::map_file;
 
 #[test]

@@ -1,0 +1,9 @@
+//! Drivers on bytes: recorded, constructed, simulated and damaged.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod encoders;
+mod identify;
+mod noise;
+mod simulated;
+mod vectors;

@@ -1,0 +1,11 @@
+//! Matchers: what they find, what they refuse, and what a match costs.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod correlative;
+mod degenerate;
+mod field;
+mod host_cost;
+mod staged;
+mod staged_search;
+mod virtual_scan;

@@ -1,0 +1,8 @@
+//! Whole drives, simulated and recorded, from bytes to poses.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod golden;
+mod interrupted;
+mod replay;
+mod simulate;

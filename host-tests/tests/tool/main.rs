@@ -1,0 +1,7 @@
+//! The command-line tool as scripts call it.
+
+mod cli;
+#[path = "../common/mod.rs"]
+mod common;
+mod fields;
+mod watch;
