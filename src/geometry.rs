@@ -138,7 +138,7 @@ impl Twist {
         omega: 0.0,
     };
 
-    /// The constant velocity that leads along `motion` in `seconds`: the inverse of [`Twist::over`].
+    /// The constant velocity that leads along `motion` in `seconds`: the inverse of [`Twist::displacement`].
     ///
     /// Zero for a time that is not positive.
     #[must_use]
@@ -164,7 +164,7 @@ impl Twist {
 
     /// Motion along the arc in `seconds` (the exponential map of SE(2)).
     #[must_use]
-    pub fn over(self, seconds: f32) -> Pose {
+    pub fn displacement(self, seconds: f32) -> Pose {
         let theta = self.omega * seconds;
         let half = 0.5 * theta;
         let (s, c) = math::sin_cos(half);
@@ -246,7 +246,10 @@ mod tests {
     fn twist_and_motion_are_inverse() {
         for motion in POSES {
             let twist = Twist::from_motion(motion, 0.1);
-            assert!(close(twist.over(0.1), motion), "{motion:?} {twist:?}");
+            assert!(
+                close(twist.displacement(0.1), motion),
+                "{motion:?} {twist:?}"
+            );
         }
         assert_eq!(Twist::from_motion(POSES[1], 0.0), Twist::ZERO);
         assert_eq!(Twist::from_motion(POSES[1], f32::NAN), Twist::ZERO);

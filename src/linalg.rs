@@ -102,7 +102,7 @@ impl Sym3 {
     /// The same quadratic form over motions whose turn is about `(x, y)`, given that over motions whose turn is about the
     /// origin.
     #[must_use]
-    pub fn turning_about(&self, x: f32, y: f32) -> Self {
+    pub fn about(&self, x: f32, y: f32) -> Self {
         // A turn about (x, y) is one about the origin and a shift by (y, -x) for each radian.
         let (xt, yt) = (
             self.xt + self.xx * y - self.xy * x,
@@ -118,7 +118,7 @@ impl Sym3 {
 
     /// `A M A` for a symmetric `A`.
     #[must_use]
-    pub fn sandwiched(&self, a: &Self) -> Self {
+    pub fn congruent(&self, a: &Self) -> Self {
         let rows = [
             a.times([self.xx, self.xy, self.xt]),
             a.times([self.xy, self.yy, self.yt]),
@@ -292,7 +292,7 @@ impl Covariance {
 
     /// The same error seen `(dx, dy)` (m) farther on, where an error of heading also is one of position.
     #[must_use]
-    pub fn carried(&self, dx: f32, dy: f32) -> Self {
+    pub fn transported(&self, dx: f32, dy: f32) -> Self {
         let m = &self.0;
         Self(Sym3 {
             xx: m.xx - 2.0 * dy * m.xt + dy * dy * m.tt,
@@ -388,15 +388,15 @@ mod tests {
     #[test]
     fn sandwich_with_the_inverse_is_the_inverse() {
         let inverse = M.inverse().expect("positive definite");
-        let sandwiched = M.sandwiched(&inverse);
-        assert!((sandwiched.xx - inverse.xx).abs() < 1e-6);
-        assert!((sandwiched.yt - inverse.yt).abs() < 1e-6);
+        let congruent = M.congruent(&inverse);
+        assert!((congruent.xx - inverse.xx).abs() < 1e-6);
+        assert!((congruent.yt - inverse.yt).abs() < 1e-6);
     }
 
     #[test]
     fn a_turn_about_another_point_is_a_turn_and_a_shift() {
         let (x, y) = (0.7, -0.4);
-        let moved = M.turning_about(x, y);
+        let moved = M.about(x, y);
         for v in [[0.0, 0.0, 1.0], [0.3, -0.2, 0.5], [1.0, 2.0, -1.0]] {
             let [a, b, t] = v;
             let about_origin = M.quadratic([a + t * y, b - t * x, t]);
@@ -406,10 +406,10 @@ mod tests {
 
     #[test]
     fn an_error_of_heading_becomes_one_of_position_farther_on() {
-        let carried = Covariance(Sym3::diagonal(0.0, 0.0, 0.01)).carried(2.0, 0.0);
+        let carried = Covariance(Sym3::diagonal(0.0, 0.0, 0.01)).transported(2.0, 0.0);
         assert!((carried.0.yy - 0.04).abs() < 1e-7 && carried.0.xx.abs() < 1e-7);
         assert!((carried.0.yt - 0.02).abs() < 1e-7);
-        let there_and_back = Covariance(M).carried(0.3, -0.7).carried(-0.3, 0.7);
+        let there_and_back = Covariance(M).transported(0.3, -0.7).transported(-0.3, 0.7);
         assert!(
             (there_and_back.0.xx - M.xx).abs() < 1e-5 && (there_and_back.0.xy - M.xy).abs() < 1e-5
         );

@@ -37,7 +37,7 @@ pub struct Match {
     /// Root mean square distance of the inliers from the reference's lines (m).
     pub residual: f32,
     /// The direction that the scene hardly determines, if there is one.
-    pub weak: Option<WeakDirection>,
+    pub degenerate_direction: Option<DegenerateDirection>,
     /// Passes over the beams, of all starts.
     pub iterations: u8,
     /// Starts tried: 1 where the guess was good enough.
@@ -52,7 +52,7 @@ pub struct Match {
 /// Along it `Match::pose` keeps the guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct WeakDirection {
+pub struct DegenerateDirection {
     /// Unit vector over (x, y, heading · lever), in the reference's frame.
     pub direction: [f32; 3],
     /// What makes a heading comparable with a distance: the points' mean distance (m).

@@ -46,7 +46,7 @@ pub struct OdometryConfig {
     /// Scans refused one after the other before the keyframe is given up. Default 10: who stands before the lidar for
     /// less than a second costs nothing.
     pub max_refused: u8,
-    /// The matcher's settings. Default [`IcpConfig::DEFAULT`], but a direction is weak below a share of 0.035: along a
+    /// The matcher's settings. Default [`IcpConfig::DEFAULT`], but a direction is degenerate below a share of 0.035: along a
     /// corridor the guess is better than what a few beams tell.
     pub icp: IcpConfig,
 }
@@ -65,7 +65,7 @@ impl OdometryConfig {
         prior_error: 0.1,
         max_refused: 10,
         icp: IcpConfig {
-            weak_share: 0.035,
+            min_constraint_share: 0.035,
             ..IcpConfig::DEFAULT
         },
     };
@@ -226,7 +226,7 @@ impl<const N: usize> Odometry<N> {
         let motion = match rolled {
             // Without a clock there is no velocity, but the wheels still tell how far.
             Some(motion) if times.seconds == 0.0 => motion,
-            _ => expected.over(times.seconds),
+            _ => expected.displacement(times.seconds),
         };
         let predicted = (self.pose * motion, self.grown(motion));
         self.see(scan, expected);
@@ -257,7 +257,10 @@ impl<const N: usize> Odometry<N> {
         let bend = math::abs(self.motion.twist.omega - before.omega) * times.duration;
         let keyframe = self.wants_keyframe(&outcome, bend);
         if keyframe {
-            if outcome.as_ref().is_ok_and(|found| found.weak.is_none()) {
+            if outcome
+                .as_ref()
+                .is_ok_and(|found| found.degenerate_direction.is_none())
+            {
                 let motion = self.keyframe_pose.between(self.seen_from);
                 let pose = self.config.mount.lidar_motion(motion);
                 icp::smooth_towards(&self.keyframe, self.points.as_mut_slice(), pose);
@@ -285,7 +288,7 @@ impl<const N: usize> Odometry<N> {
             return Some(self.pose);
         }
         // Wheels that slip tell a wrong motion; but a clock whose moments jump tells a wild velocity.
-        let on = self.pose * self.motion.twist.over(times.seconds);
+        let on = self.pose * self.motion.twist.displacement(times.seconds);
         let wild = farther(predicted, on, self.config.max_correction).is_some();
         (!wild).then_some(on)
     }
@@ -311,7 +314,7 @@ impl<const N: usize> Odometry<N> {
         for twist in [quicker(1.0), quicker(-1.0), quicker(2.0), quicker(-2.0)] {
             self.see(scan, twist);
             seen = twist;
-            let other = self.matched(self.pose * twist.over(times.seconds));
+            let other = self.matched(self.pose * twist.displacement(times.seconds));
             if score(&other) > score(outcome) {
                 *outcome = other;
                 best = twist;
@@ -339,7 +342,7 @@ impl<const N: usize> Odometry<N> {
         let back = -0.5 * times.duration;
         let (end, mut covariance) = self.placed(found);
         self.seen_from = end;
-        let mut middle = end * expected.over(back);
+        let mut middle = end * expected.displacement(back);
         let sudden = self.refused_in_a_row > 0 || expected != self.motion.twist;
         let during = if rolling.is_none() && sudden {
             // From the last scan's middle no velocity can be measured: that one's place was only a guess, or the velocity
@@ -348,16 +351,19 @@ impl<const N: usize> Odometry<N> {
         } else {
             self.motion.during(middle, rolling, times)
         };
-        if differs(expected.over(times.duration), during.over(times.duration)) {
+        if differs(
+            expected.displacement(times.duration),
+            during.displacement(times.duration),
+        ) {
             self.see(scan, during);
-            self.seen_from = middle * during.over(-back);
+            self.seen_from = middle * during.displacement(-back);
             if let Ok(again) = self.matched(self.seen_from) {
                 *found = again;
                 (self.seen_from, covariance) = self.placed(found);
-                middle = self.seen_from * during.over(back);
+                middle = self.seen_from * during.displacement(back);
             }
         }
-        let pose = middle * during.over(-back);
+        let pose = middle * during.displacement(-back);
         self.motion.advance(pose, during, rolling, times);
         (pose, covariance)
     }
@@ -368,7 +374,7 @@ impl<const N: usize> Odometry<N> {
             min_range: self.config.min_range,
             max_range: self.config.max_range,
             upside_down: self.config.mount.upside_down,
-            enough: self.config.enough,
+            max_points: self.config.enough,
         };
         let twist = self.config.mount.lidar_twist(during);
         self.points.assign(scan, twist, &config);
@@ -404,7 +410,7 @@ impl<const N: usize> Odometry<N> {
         let turn = self.config.prior_error * math::abs(motion.theta) + LEAST;
         let moved = self.pose * motion;
         self.covariance
-            .carried(moved.x - self.pose.x, moved.y - self.pose.y)
+            .transported(moved.x - self.pose.x, moved.y - self.pose.y)
             .plus(&Covariance(Sym3::diagonal(
                 along * along,
                 along * along,
@@ -445,10 +451,10 @@ impl<const N: usize> Odometry<N> {
         let of_match = found
             .covariance
             .rotated(lidar_frame)
-            .carried(pose.x - start_from_lidar.x, pose.y - start_from_lidar.y);
+            .transported(pose.x - start_from_lidar.x, pose.y - start_from_lidar.y);
         let covariance = self
             .keyframe_covariance
-            .carried(pose.x - self.keyframe_pose.x, pose.y - self.keyframe_pose.y)
+            .transported(pose.x - self.keyframe_pose.x, pose.y - self.keyframe_pose.y)
             .plus(&of_match);
         (pose, covariance)
     }

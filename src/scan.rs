@@ -2,7 +2,7 @@
 
 pub mod assembler;
 pub mod beam;
-pub mod bins;
+pub mod decimator;
 pub mod filter;
 pub mod mount;
 pub mod points;

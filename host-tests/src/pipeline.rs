@@ -57,7 +57,7 @@ pub fn places(beams: &[Beam], motion: Pose, seconds: f32, robot_from_lidar: Pose
         let range = beam.range.metres().ok()?;
         let (s, c) = beamfix::math::sin_cos(beam.bearing.radians());
         let age = end_us.wrapping_sub(beam.time_us) as f32 * 1e-6;
-        let end_from_then = twist.over(-age);
+        let end_from_then = twist.displacement(-age);
         Some(end_from_then * (robot_from_lidar * Point::new(range * c, range * s)))
     };
     beams.iter().filter_map(place).collect()

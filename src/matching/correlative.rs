@@ -6,7 +6,7 @@
 pub mod pyramid;
 pub(crate) mod rotated;
 
-use super::{Match, MatchError, WeakDirection};
+use super::{DegenerateDirection, Match, MatchError};
 use crate::{
     geometry::{Point, Pose},
     linalg::{Covariance, Sym3},
@@ -260,7 +260,7 @@ impl<const N: usize> Correlator<N> {
                     0.0,
                 )),
             score: share(best.sum),
-            weak: (largest > flat * flat).then(|| WeakDirection {
+            degenerate_direction: (largest > flat * flat).then(|| DegenerateDirection {
                 direction,
                 lever,
                 sigma: math::sqrt(largest),

@@ -7,7 +7,7 @@
 mod pass;
 
 use self::pass::{CHUNK, Part, Pass, TOGETHER};
-use super::{Match, MatchError, WeakDirection};
+use super::{DegenerateDirection, Match, MatchError};
 use crate::{
     geometry::{Point, Pose},
     grid::Shape,
@@ -37,9 +37,9 @@ pub struct FieldConfig {
     pub min_share: f32,
     /// Least noise to assume (m): what the field's cells leave. Default 0.01.
     pub sigma: f32,
-    /// A direction is weak whose curvature is below this share of the strongest one's. Default 0.05: range noise
+    /// A direction is degenerate whose curvature is below this share of the strongest one's. Default 0.05: range noise
     /// alone makes up to 0.03 along the bare walls of a corridor.
-    pub weak_share: f32,
+    pub min_curvature_share: f32,
 }
 
 impl FieldConfig {
@@ -53,7 +53,7 @@ impl FieldConfig {
         min_inliers: 20,
         min_share: 0.3,
         sigma: 0.01,
-        weak_share: 0.05,
+        min_curvature_share: 0.05,
     };
 }
 
@@ -66,7 +66,7 @@ impl Default for FieldConfig {
 /// Pose from which `points` fit `field` best, near `guess`.
 ///
 /// From 2.5σ and a few degrees off: start from a search or a coarser field otherwise.
-/// A direction that the scene hardly determines keeps the guess and is named in [`Match::weak`].
+/// A direction that the scene hardly determines keeps the guess and is named in [`Match::degenerate_direction`].
 pub fn align<F: Field + ?Sized>(
     field: &F,
     points: &[ScanPoint],
@@ -101,7 +101,7 @@ pub fn align<F: Field + ?Sized>(
             pose,
             usize::from(stride),
             gate,
-            config.weak_share,
+            config.min_curvature_share,
             known,
         )
         .ok_or(MatchError::BadGuess)?;
@@ -177,7 +177,7 @@ struct Axes {
     /// What is added to it before it is solved: a map's walls are some cells thick, flat inside, and what their field
     /// bends there says too little of how far the next step may go.
     damping: f32,
-    /// Its eigenvalues and vectors, where some direction may be weak.
+    /// Its eigenvalues and vectors, where some direction may be degenerate.
     pairs: Option<[(f32, [f32; 3]); 3]>,
 }
 
@@ -189,7 +189,7 @@ impl Sums {
         pose: Pose,
         stride: usize,
         gate: u8,
-        weak_share: f32,
+        min_curvature_share: f32,
         known: Option<&Self>,
     ) -> Option<Self> {
         let placement = Placement::new(field.shape(), pose)?;
@@ -236,7 +236,8 @@ impl Sums {
                 let curvature = sums.curvature();
                 let lever = sums.mean_lever(&curvature);
                 let scaled = curvature.theta_scaled(1.0 / lever);
-                let pairs = (!well_determined(&scaled, weak_share)).then(|| scaled.eigen());
+                let pairs =
+                    (!well_determined(&scaled, min_curvature_share)).then(|| scaled.eigen());
                 // Half of what thin walls would have.
                 let expected = 0.5 * Self::wall(field) * f32::from(sums.inliers);
                 let damping = 0.5 * math::max(expected - (scaled.xx + scaled.yy), 0.0);
@@ -303,7 +304,7 @@ impl Sums {
             None => scaled
                 .plus(&Sym3::diagonal(damping, damping, damping))
                 .solve(slope)?,
-            Some(pairs) => along_strong(&pairs, slope, damping, config.weak_share)?,
+            Some(pairs) => along_strong(&pairs, slope, damping, config.min_curvature_share)?,
         };
         step[2] /= lever;
         // Ten cells and a third of a radian at most: the parabolas end long before.
@@ -395,16 +396,20 @@ impl Sums {
         };
         let information = geometry.scaled(1.0 / (sigma * sigma));
         let lever = math::max(self.axes.lever * resolution, 1e-3);
-        let weak = self.axes.pairs.and_then(|_| {
+        let degenerate_direction = self.axes.pairs.and_then(|_| {
             let [(least, axis), _, (strongest, _)] = geometry.theta_scaled(1.0 / lever).eigen();
-            (least < config.weak_share * strongest).then(|| WeakDirection {
+            (least < config.min_curvature_share * strongest).then(|| DegenerateDirection {
                 direction: axis,
                 lever,
                 sigma: sigma / math::sqrt(math::max(least, 1e-3)),
             })
         });
-        // Along a weak direction nothing is known: 1 m of doubt instead of a singular matrix.
-        let floor = if weak.is_some() { 1.0 } else { 0.0 };
+        // Along a degenerate direction nothing is known: 1 m of doubt instead of a singular matrix.
+        let floor = if degenerate_direction.is_some() {
+            1.0
+        } else {
+            0.0
+        };
         let covariance =
             Information(information.plus(&Sym3::diagonal(floor, floor, floor * lever * lever)))
                 .covariance()
@@ -418,7 +423,7 @@ impl Sums {
             beams: beams as u16,
             residual,
             score: self.score(beams, scale.unexplored),
-            weak,
+            degenerate_direction,
             iterations,
             starts: 1,
             rival: 0.0,
@@ -426,23 +431,23 @@ impl Sums {
     }
 }
 
-/// Whether for certain no direction is weak: an eigenvalue is at least 4·det/tr², since the other two multiply to no
+/// Whether for certain no direction is degenerate: an eigenvalue is at least 4·det/tr², since the other two multiply to no
 /// more than tr²/4, and none is above tr.
-fn well_determined(m: &Sym3, weak_share: f32) -> bool {
+fn well_determined(m: &Sym3, min_curvature_share: f32) -> bool {
     let trace = m.xx + m.yy + m.tt;
     let minor = m.xx * m.yy - m.xy * m.xy;
     let determinant =
         m.tt * minor - m.xx * m.yt * m.yt - m.yy * m.xt * m.xt + 2.0 * m.xy * m.xt * m.yt;
     // All three positive, not two of them negative.
-    m.xx > 0.0 && minor > 0.0 && 4.0 * determinant > weak_share * trace * trace * trace
+    m.xx > 0.0 && minor > 0.0 && 4.0 * determinant > min_curvature_share * trace * trace * trace
 }
 
-/// Newton step along each eigenvector for itself: a weak one keeps the guess. `None` where all are.
+/// Newton step along each eigenvector for itself: a degenerate one keeps the guess. `None` where all are.
 fn along_strong(
     pairs: &[(f32, [f32; 3]); 3],
     slope: [f32; 3],
     damping: f32,
-    weak_share: f32,
+    min_curvature_share: f32,
 ) -> Option<[f32; 3]> {
     let strongest = pairs[2].0;
     if !(strongest > 0.0) {
@@ -450,7 +455,7 @@ fn along_strong(
     }
     let mut step = [0.0f32; 3];
     for (value, axis) in pairs {
-        if *value < weak_share * strongest {
+        if *value < min_curvature_share * strongest {
             continue;
         }
         let along =

@@ -2,7 +2,7 @@
 //!
 //! Unlike a likelihood field, it holds it against a pose when free space lies on walls: a check for closed loops.
 
-use super::{Match, MatchError, WeakDirection};
+use super::{DegenerateDirection, Match, MatchError};
 use crate::{
     geometry::{Point, Pose},
     grid::{Grid, occupancy},
@@ -289,7 +289,7 @@ pub fn align(
         beams: local.cells().len().min(65_535) as u16,
         score: found.common,
         residual: 0.0,
-        weak: (largest > flat * flat).then(|| WeakDirection {
+        degenerate_direction: (largest > flat * flat).then(|| DegenerateDirection {
             direction,
             lever,
             sigma: math::sqrt(largest),

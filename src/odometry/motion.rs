@@ -54,8 +54,8 @@ impl Motion {
         }
         let between = times.seconds + 0.5 * (self.duration - times.duration);
         let by_wheels = rolling.unwrap_or(Twist::ZERO);
-        let rolled = self.rolling.over(0.5 * self.duration)
-            * by_wheels.over(times.seconds - 0.5 * times.duration);
+        let rolled = self.rolling.displacement(0.5 * self.duration)
+            * by_wheels.displacement(times.seconds - 0.5 * times.duration);
         let missed = rolled.between(self.middle.between(middle));
         if rolling.is_some() && missed.distance() < SLIP.0 && math::abs(missed.theta) < SLIP.1 {
             return by_wheels;
@@ -77,7 +77,7 @@ impl Motion {
 
     /// A scan was taken that ended at `end` and during which the robot moved with `twist`.
     pub fn advance(&mut self, end: Pose, twist: Twist, rolling: Option<Twist>, times: Times) {
-        self.middle = end * twist.over(-0.5 * times.duration);
+        self.middle = end * twist.displacement(-0.5 * times.duration);
         self.rolling = rolling.unwrap_or(Twist::ZERO);
         self.duration = times.duration;
         self.usual += 0.1 * (times.seconds - self.usual);
@@ -104,12 +104,12 @@ mod tests {
         let mut end = Pose::IDENTITY;
         motion.advance(end, truth, wheels, TIMES);
         for &error in errors {
-            end = end * truth.over(TIMES.seconds);
-            let mut middle = end * truth.over(-0.5 * TIMES.duration);
+            end = end * truth.displacement(TIMES.seconds);
+            let mut middle = end * truth.displacement(-0.5 * TIMES.duration);
             middle.theta += error;
             let during = motion.during(middle, wheels, TIMES);
             motion.advance(
-                middle * during.over(0.5 * TIMES.duration),
+                middle * during.displacement(0.5 * TIMES.duration),
                 during,
                 wheels,
                 TIMES,

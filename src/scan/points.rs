@@ -31,7 +31,7 @@ pub struct PointsConfig {
     pub upside_down: bool,
     /// Scans of more beams are thinned to about so many points by averaging neighbours on one surface: nothing of what
     /// they know is lost, and everything after costs as much less. Default `u16::MAX`: every beam is a point.
-    pub enough: u16,
+    pub max_points: u16,
 }
 
 impl PointsConfig {
@@ -40,7 +40,7 @@ impl PointsConfig {
         min_range: 0.05,
         max_range: 32.0,
         upside_down: false,
-        enough: u16::MAX,
+        max_points: u16::MAX,
     };
 }
 
@@ -96,7 +96,7 @@ impl<const N: usize> Points<N> {
             last: scan.last_age(),
             deskew: Deskew::new(twist, scan.duration()),
         };
-        let most = scan.len().div_ceil(usize::from(config.enough.max(1)));
+        let most = scan.len().div_ceil(usize::from(config.max_points.max(1)));
         for beams in scan.stored().chunks(most.clamp(1, MERGE_MOST)) {
             if let Some(mean) = sweep.mean(beams) {
                 sweep.place(mean, &mut self.points);
@@ -234,7 +234,7 @@ impl Deskew {
     /// `None` where the motion over the sweep is too small to matter (0.1 mm, 0.001°), or faster than any robot (40 rad/s, 100 m/s).
     fn new(twist: Twist, duration: f32) -> Option<Self> {
         const TICK: f32 = 0.065_536;
-        let motion = twist.over(duration);
+        let motion = twist.displacement(duration);
         let still = motion.distance() < 1e-4 && math::abs(motion.theta) < 2e-5;
         let speed = math::abs(twist.vx) + math::abs(twist.vy);
         // The negated form refuses NaN too.
@@ -359,7 +359,7 @@ mod tests {
             let mut swept = Scan::<8>::new();
             for k in 0..8u32 {
                 let time_us = 25_000 * k;
-                let seen = twist.over(time_us as f32 * 1e-6).inverse() * place;
+                let seen = twist.displacement(time_us as f32 * 1e-6).inverse() * place;
                 let beam = Beam {
                     bearing: Bearing::from_radians(math::atan2(seen.y, seen.x)),
                     range: Range::from_metres(seen.norm()),
@@ -370,7 +370,7 @@ mod tests {
             }
             let mut points = Points::<8>::new();
             points.assign(&swept, twist, &PointsConfig::DEFAULT);
-            let expected = twist.over(0.175).inverse() * place;
+            let expected = twist.displacement(0.175).inverse() * place;
             for p in points.as_slice() {
                 let (dx, dy) = (
                     f32::from(p.x) - 1e3 * expected.x,

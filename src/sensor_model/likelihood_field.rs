@@ -5,8 +5,8 @@
 //! that ends far from all. An unexplored cell, and every place off the map, is worth `1 / z_max`; the byte
 //! that stands for this ([`Scale::unexplored`]) is reserved, so unexplored cells need no test in a sum.
 
+pub mod draw;
 pub mod placement;
-pub mod stamp;
 pub mod stored;
 pub mod tiles;
 
@@ -229,7 +229,7 @@ impl Score {
 
 /// A cell's byte with those beside it.
 #[derive(Debug, Clone, Copy)]
-pub struct Around {
+pub struct Stencil {
     /// The cell's own.
     pub here: i32,
     /// One column less.
@@ -246,7 +246,7 @@ pub struct Around {
 
 /// Second derivatives of the bytes by column and row.
 #[derive(Debug, Clone, Copy)]
-pub struct Bend {
+pub struct Hessian {
     /// Twice by column.
     pub xx: i32,
     /// By each.
@@ -255,12 +255,12 @@ pub struct Bend {
     pub yy: i32,
 }
 
-impl Around {
+impl Stencil {
     /// How the bytes bend.
     #[inline]
     #[must_use]
-    pub const fn bend(&self) -> Bend {
-        Bend {
+    pub const fn hessian(&self) -> Hessian {
+        Hessian {
             xx: self.right + self.left - 2 * self.here,
             xy: self.corner + self.here - self.above - self.right,
             yy: self.above + self.below - 2 * self.here,
@@ -280,7 +280,7 @@ pub trait Field {
     fn byte(&self, x: u32, y: u32) -> u8;
 
     /// The byte with its neighbours; `None` at the edge and off the field.
-    fn around(&self, x: u32, y: u32) -> Option<Around>;
+    fn stencil(&self, x: u32, y: u32) -> Option<Stencil>;
 
     /// Sum of the bytes that `points` end in.
     fn sum(&self, points: &[ScanPoint], placement: &Placement) -> u32 {
@@ -344,7 +344,7 @@ impl<S: AsRef<[u8]>> LikelihoodField<S> {
 }
 
 impl<S: AsRef<[u8]> + AsMut<[u8]>> LikelihoodField<S> {
-    /// A field with nothing explored, for [`stamp`].
+    /// A field with nothing explored, for [`draw`].
     pub fn unexplored(shape: Shape, cells: S, scale: Scale) -> Result<Self, GridError> {
         let mut grid = Grid::new(shape, cells)?;
         grid.cells_mut().fill(scale.unexplored);
@@ -383,7 +383,7 @@ impl<S: AsRef<[u8]> + AsMut<[u8]>> LikelihoodField<S> {
     }
 }
 
-impl<S: AsRef<[u8]> + AsMut<[u8]>> stamp::Canvas for LikelihoodField<S> {
+impl<S: AsRef<[u8]> + AsMut<[u8]>> draw::Canvas for LikelihoodField<S> {
     fn shape(&self) -> &Shape {
         self.grid.shape()
     }
@@ -429,7 +429,7 @@ impl Field for LikelihoodField<&[u8]> {
     }
 
     #[inline]
-    fn around(&self, x: u32, y: u32) -> Option<Around> {
+    fn stencil(&self, x: u32, y: u32) -> Option<Stencil> {
         // No table is narrower than this that has a cell inside its edge: said so that `width - 1` needs no check.
         let width = usize::from(self.grid.shape().width()).max(2);
         if x.wrapping_sub(1) >= (width as u32).wrapping_sub(2) {
@@ -447,7 +447,7 @@ impl Field for LikelihoodField<&[u8]> {
         else {
             return None;
         };
-        Some(Around {
+        Some(Stencil {
             here: i32::from(here),
             left: i32::from(left),
             right: i32::from(right),

@@ -20,7 +20,7 @@ pub const LINES: usize = 180;
 
 /// Neighbouring beams averaged until about so many points are left: a third of the time for a sixth of the accuracy.
 const POINTS: PointsConfig = PointsConfig {
-    enough: 130,
+    max_points: 130,
     ..PointsConfig::DEFAULT
 };
 

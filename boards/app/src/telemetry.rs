@@ -202,7 +202,7 @@ impl Found {
             beams: found.beams,
             residual: found.residual,
             covariance: [c.xx, c.xy, c.yy, c.xt, c.yt, c.tt],
-            weak: found.weak.map(|weak| Weak {
+            weak: found.degenerate_direction.map(|weak| Weak {
                 direction: weak.direction,
                 sigma: weak.sigma,
             }),

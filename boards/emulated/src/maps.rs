@@ -17,7 +17,7 @@ use beamfix::{
         BeamModel,
         beam_model::{BeamTable, learning::Learner},
         likelihood_field::{
-            Field as _, FieldModel, LikelihoodField, Profile, stamp::Canvas as _, stored,
+            Field as _, FieldModel, LikelihoodField, Profile, draw::Canvas as _, stored,
             tiles::Tiles,
         },
     },

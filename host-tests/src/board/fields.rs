@@ -10,7 +10,7 @@ use beamfix::{
     },
     scan::ScanPoint,
     sensor_model::likelihood_field::{
-        Field as _, FieldModel, LikelihoodField, Profile, stamp::Canvas as _, stored,
+        Field as _, FieldModel, LikelihoodField, Profile, draw::Canvas as _, stored,
     },
 };
 use serde::{Deserialize, Serialize};

@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 use beamfix::geometry::Pose;
 use beamfix::scan::Beam;
 use beamfix::scan::assembler::TurnStarts;
-use beamfix::scan::bins::{Bins, Keep};
+use beamfix::scan::decimator::{Decimator, Keep};
 
 use super::{Log, Recorded, bytes};
 use crate::decode::{self, Summary};
@@ -74,8 +74,8 @@ fn thinned(beams: Vec<Beam>) -> Vec<Beam> {
     if beams.len() <= MOST_BEAMS {
         return beams;
     }
-    let mut bins = Bins::new(MOST_BEAMS as u16, Keep::First);
-    let kept = beams.iter().filter_map(|beam| bins.push(*beam, false));
+    let mut decimator = Decimator::new(MOST_BEAMS as u16, Keep::First);
+    let kept = beams.iter().filter_map(|beam| decimator.push(*beam, false));
     kept.map(|(beam, _)| beam).collect()
 }
 

@@ -11,7 +11,7 @@ use beamfix::{
     scan::{Beam, Points, PointsConfig, Scan, ScanPoint},
     sensor_model::likelihood_field::{
         FieldModel, LikelihoodField, Profile,
-        stamp::{self, Canvas, StampConfig},
+        draw::{self, Canvas, DrawConfig},
     },
 };
 use beamfix_sim::{lidar::Still, noise::Noise, pose::TruePose, world::World};
@@ -50,12 +50,12 @@ pub fn field_of(
     let profile = Profile::new(model);
     let mut field =
         LikelihoodField::unexplored(shape, vec![0; shape.len()], *profile.scale()).expect("fits");
-    stamp::scan(
+    draw::scan(
         &mut field,
         points,
         Pose::IDENTITY,
         &profile,
-        &StampConfig::DEFAULT,
+        &DrawConfig::DEFAULT,
     );
     field
 }

@@ -15,7 +15,7 @@ use beamfix::{
     },
     sensor_model::likelihood_field::{
         Field, FieldModel, LikelihoodField, Profile,
-        stamp::{self, StampConfig},
+        draw::{self, DrawConfig},
         tiles::Tiles,
     },
 };
@@ -36,19 +36,19 @@ fn tiles_hold_what_one_table_holds() {
     for place in [[3.0, 2.7], [3.05, 4.15], [4.8, 4.3], [7.6, 5.9]] {
         let pose = TruePose::new(place[0], place[1], noise.even(-3.0, 3.0));
         let points = points_from(&world, pose, 450, &mut noise);
-        stamp::scan(
+        draw::scan(
             &mut *tiles,
             &points,
             pose.into(),
             &profile,
-            &StampConfig::DEFAULT,
+            &DrawConfig::DEFAULT,
         );
-        stamp::scan(
+        draw::scan(
             &mut table,
             &points,
             pose.into(),
             &profile,
-            &StampConfig::DEFAULT,
+            &DrawConfig::DEFAULT,
         );
     }
     assert_eq!(tiles.dropped(), 0);

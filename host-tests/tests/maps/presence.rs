@@ -6,7 +6,7 @@ use beamfix::{
     grid::Shape,
     localization::presence::{self, PresenceConfig},
     matching::correlative::{Correlator, pyramid::Pyramid},
-    sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile, stamp::Canvas},
+    sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile, draw::Canvas},
 };
 use beamfix_sim::{home, noise::Noise, pose::TruePose, world::World};
 use host_tests::map_file;

@@ -188,7 +188,7 @@ fn a_corridor_is_weak_along_itself_and_two_equal_rooms_are_ambiguous() {
             &CorrelativeConfig::DEFAULT,
         )
         .expect("a match");
-    let weak = found.weak.expect("a weak direction");
+    let weak = found.degenerate_direction.expect("a weak direction");
     // The corridor runs along -0.3 rad in the lidar's frame.
     let (s, c) = beamfix::math::sin_cos(0.3);
     let along = weak.direction[0] * c - weak.direction[1] * s;
@@ -202,7 +202,7 @@ fn a_corridor_is_weak_along_itself_and_two_equal_rooms_are_ambiguous() {
     let newton = newton.expect("a match");
     assert!(
         newton
-            .weak
+            .degenerate_direction
             .is_some_and(|weak| weak.direction[2].abs() < 0.2),
         "{newton:?}"
     );

@@ -4,7 +4,7 @@ use crate::common::{points_from, points_of};
 use beamfix::{
     geometry::Pose,
     matching::{
-        Match, MatchError, WeakDirection,
+        DegenerateDirection, Match, MatchError,
         icp::{self, IcpConfig, Reference, Search},
     },
     scan::{Beam, Range, ScanPoint},
@@ -66,7 +66,7 @@ fn right(truth: TruePose, found: Pose) -> bool {
 }
 
 /// Cosine between a weak direction and another one.
-fn alike(weak: &WeakDirection, other: [f64; 3]) -> f64 {
+fn alike(weak: &DegenerateDirection, other: [f64; 3]) -> f64 {
     let norm = libm::sqrt(other.iter().map(|v| v * v).sum());
     let product: f64 = weak
         .direction
@@ -121,7 +121,7 @@ fn slide(world: &World) -> Slides {
         let (dx, dy) = (face.to[0] - face.from[0], face.to[1] - face.from[1]);
         let along = libm::atan2(dy, dx) - place.theta;
         let (s, c) = (libm::sin(along), libm::cos(along));
-        match found.weak {
+        match found.degenerate_direction {
             Some(weak) => slides.cosine = slides.cosine.min(alike(&weak, [c, s, 0.0])),
             None => slides.not_weak += 1,
         }
@@ -187,7 +187,9 @@ fn a_circle_is_weak_about_its_centre() {
         let (reference, current, motion, guess) = pair(&world, place, &mut noise);
         let found = align(&reference, &current, guess.into(), Search::Local)
             .unwrap_or_else(|e| panic!("{seed}: {e}"));
-        let weak = found.weak.unwrap_or_else(|| panic!("{seed}: not weak"));
+        let weak = found
+            .degenerate_direction
+            .unwrap_or_else(|| panic!("{seed}: not weak"));
         // Turning about the centre by a little moves the lidar across its arm.
         let centre = place.between(TruePose::default());
         let arm = [motion.x - centre.x, motion.y - centre.y];
@@ -216,7 +218,7 @@ fn a_square_room_is_determined_but_for_the_quarter_turn_that_the_guess_decides()
         let found = align(&reference, &current, guess.into(), Search::Local)
             .unwrap_or_else(|e| panic!("{seed}: {e}"));
         assert!(right(motion, found.pose), "{seed}: {found:?}");
-        assert_eq!(found.weak, None, "{seed}");
+        assert_eq!(found.degenerate_direction, None, "{seed}");
         // The room a quarter turn on, about its middle, is the same room.
         let quarter = TruePose::new(0.0, 0.0, core::f64::consts::FRAC_PI_2);
         let turned = |pose: TruePose| place.between(quarter.then(place.then(pose)));

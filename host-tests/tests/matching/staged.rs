@@ -473,7 +473,7 @@ fn a_corridor_is_weak_along_it_and_keeps_the_guess() {
         )
         .unwrap_or_else(|e| panic!("seed {seed}: {e}"));
         let weak = found
-            .weak
+            .degenerate_direction
             .unwrap_or_else(|| panic!("seed {seed}: {found:?}"));
         assert!(weak.direction[0].abs() > 0.98, "seed {seed}: {weak:?}");
         // The scan knows nothing along the corridor: metres; and a centimetre at most across it.

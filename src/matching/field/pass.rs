@@ -4,7 +4,7 @@ use core::num::Wrapping;
 
 use crate::{
     scan::points::ScanPoint,
-    sensor_model::likelihood_field::{Bend, Field, placement::Placement},
+    sensor_model::likelihood_field::{Field, Hessian, placement::Placement},
 };
 
 /// Side of the square around a beam in which its neighbours are taken together with it: so many cells, up to twice that.
@@ -69,7 +69,7 @@ impl Pass {
             let x = place.x.wrapping_add(x as u32);
             let y = place.y.wrapping_add(y as u32);
             let (column, row) = (x >> shift, y >> shift);
-            let Some(cells) = field.around(column, row) else {
+            let Some(cells) = field.stencil(column, row) else {
                 continue;
             };
             if cells.here < self.gate {
@@ -87,7 +87,7 @@ impl Pass {
             let x = lidar.0.wrapping_mul(n).wrapping_add(rx) >> self.fine;
             let y = lidar.1.wrapping_mul(n).wrapping_add(ry) >> self.fine;
             let (dx, dy) = (x - (n << 5), y - (n << 5));
-            let Bend { xx, xy, yy } = cells.bend();
+            let Hessian { xx, xy, yy } = cells.hessian();
             let slope_x = Wrapping((cells.right - cells.left) * (n << 5) + xx * dx + xy * dy);
             let slope_y = Wrapping((cells.above - cells.below) * (n << 5) + yy * dy + xy * dx);
             let (lx, ly) = (
@@ -124,14 +124,14 @@ impl Pass {
             let (rx, ry) = self.placement.turned(point.x.into(), point.y.into());
             let fx = self.placement.x.wrapping_add(rx as u32) >> self.fine;
             let fy = self.placement.y.wrapping_add(ry as u32) >> self.fine;
-            let Some(cells) = field.around(fx >> 6, fy >> 6) else {
+            let Some(cells) = field.stencil(fx >> 6, fy >> 6) else {
                 continue;
             };
             if cells.here < self.gate {
                 continue;
             }
             let (dx, dy) = ((fx & 63) as i32 - 32, (fy & 63) as i32 - 32);
-            let Bend { xx, xy, yy } = cells.bend();
+            let Hessian { xx, xy, yy } = cells.hessian();
             // The slope in the cell's middle, and from there on.
             let slope_x = Wrapping(((cells.right - cells.left) << 5) + xx * dx + xy * dy);
             let slope_y = Wrapping(((cells.above - cells.below) << 5) + yy * dy + xy * dx);

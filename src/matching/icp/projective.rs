@@ -59,9 +59,9 @@ pub struct IcpConfig {
     pub min_score: f32,
     /// Standard deviation of a range (m): the least noise that the covariance assumes. Default 0.005.
     pub range_sigma: f32,
-    /// A direction is weak that less than this share of the beams tell. Default 0.02: what the noise of the normals alone
+    /// A direction is degenerate that less than this share of the beams tell. Default 0.02: what the noise of the normals alone
     /// amounts to in a corridor.
-    pub weak_share: f32,
+    pub min_constraint_share: f32,
 }
 
 impl IcpConfig {
@@ -72,7 +72,7 @@ impl IcpConfig {
         min_inliers: 30,
         min_score: 0.25,
         range_sigma: 0.005,
-        weak_share: 0.02,
+        min_constraint_share: 0.02,
     };
 }
 
@@ -146,7 +146,7 @@ pub fn align_observed<const N: usize>(
 /// Moves `points`, seen at `pose` in the reference's frame, towards the surfaces that the reference saw there, if they are
 /// less than 32 mm off: laid as the next reference, they know what this one knew.
 ///
-/// For poses of matches without a weak direction: along one, surfaces would be passed on to the wrong place. Costs a pass
+/// For poses of matches without a degenerate direction: along one, surfaces would be passed on to the wrong place. Costs a pass
 /// over the points; at a pose that is not finite or more than 27 m away they stay as they are.
 pub fn smooth_towards<const N: usize>(
     reference: &Reference<N>,

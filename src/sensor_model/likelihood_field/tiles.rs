@@ -1,6 +1,6 @@
 //! A field that rolls along with the robot: a square window of tiles, of which only those near surfaces take memory.
 
-use super::{Around, Field, Scale, stamp::Canvas};
+use super::{Field, Scale, Stencil, draw::Canvas};
 use crate::{
     geometry::{Point, Pose},
     grid::{GridError, Shape},
@@ -239,13 +239,13 @@ impl<const T: usize, const I: usize> Field for Tiles<T, I> {
             .unwrap_or(self.scale.unexplored)
     }
 
-    fn around(&self, x: u32, y: u32) -> Option<Around> {
+    fn stencil(&self, x: u32, y: u32) -> Option<Stencil> {
         let last = u32::from(self.shape.width()) - 1;
         if x == 0 || y == 0 || x >= last || y >= last {
             return None;
         }
         let at = |x: u32, y: u32| i32::from(self.byte(x, y));
-        Some(Around {
+        Some(Stencil {
             here: at(x, y),
             left: at(x - 1, y),
             right: at(x + 1, y),

@@ -1,10 +1,10 @@
-//! What a modular match is worth: enough to go by, covariance, weak direction.
+//! What a modular match is worth: enough to go by, covariance, degenerate direction.
 
 use crate::{
     geometry::Pose,
     linalg::{Covariance, Information, Sym3},
     matching::{
-        Match, MatchError, WeakDirection,
+        DegenerateDirection, Match, MatchError,
         icp::modular::{Cloud, Limits, Pair, minimisation::normal_equations},
     },
     math,
@@ -146,10 +146,10 @@ pub(super) fn judge(
     // A direction that is not determined at all still has a finite variance: 10 m, 10 rad.
     let bounded = information.plus(&Sym3::diagonal(0.01, 0.01, 0.01));
     let covariance = bounded.inverse().ok_or(MatchError::Degenerate)?;
-    let weak = determined.open.map(|(_, direction)| {
+    let degenerate_direction = determined.open.map(|(_, direction)| {
         let [x, y, t] = direction;
         let variance = covariance.quadratic([x, y, t * determined.lever]);
-        WeakDirection {
+        DegenerateDirection {
             direction,
             lever: determined.lever,
             sigma: math::sqrt(variance),
@@ -168,7 +168,7 @@ pub(super) fn judge(
         beams: current.points.len() as u16,
         score: score / pairs.len() as f32,
         residual,
-        weak,
+        degenerate_direction,
         iterations,
         starts: 1,
         rival: 0.0,

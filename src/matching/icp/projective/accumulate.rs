@@ -407,7 +407,7 @@ impl Sums {
             yt: yt * N * lever,
             tt: tt * lever * lever,
         }
-        .turning_about(at.x as f32 / PER_METRE, at.y as f32 / PER_METRE)
+        .about(at.x as f32 / PER_METRE, at.y as f32 / PER_METRE)
     }
 }
 

@@ -1,10 +1,10 @@
-//! What a match is worth: covariance, weak direction, verdict.
+//! What a match is worth: covariance, degenerate direction, verdict.
 
 use crate::{
     geometry::Pose,
     linalg::{Covariance, Information, Sym3},
     matching::{
-        Match, MatchError, WeakDirection,
+        DegenerateDirection, Match, MatchError,
         icp::projective::{
             FINE, Task,
             accumulate::{FixedPose, Pass},
@@ -45,17 +45,17 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
     let residual = sums.residual();
     let noise = math::max(residual * residual, config.range_sigma * config.range_sigma);
     let mut pose = best.last.at.pose();
-    let weak = weak_direction(
+    let degenerate_direction = degenerate_direction(
         &h.theta_scaled(1.0 / lever),
         lever,
         noise,
-        config.weak_share * sums.total_weight(),
+        config.min_constraint_share * sums.total_weight(),
     )?;
     let step = best.last.length;
-    if weak.is_none() && step > TOO_LONG {
+    if degenerate_direction.is_none() && step > TOO_LONG {
         return Err(MatchError::NotConverged { step });
     }
-    if let Some(WeakDirection { direction, .. }) = weak {
+    if let Some(DegenerateDirection { direction, .. }) = degenerate_direction {
         let [x, y, t] = direction;
         // What the noise of the normals pretends to know along it is not known.
         let pretended = h.theta_scaled(1.0 / lever).quadratic(direction);
@@ -82,7 +82,7 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         beams: task.points.len() as u16,
         score: best.candidate.value,
         residual,
-        weak,
+        degenerate_direction,
         iterations: best.iterations,
         starts: best.starts,
         rival: best.ratio,
@@ -128,12 +128,12 @@ fn without(pose: Pose, other: Pose, [x, y, t]: [f32; 3], lever: f32) -> Pose {
 /// The direction that is not determined, if there is one; refuses two.
 ///
 /// `h` is the curvature with headings as long as distances, `threshold` what it must have along a direction.
-fn weak_direction(
+fn degenerate_direction(
     h: &Sym3,
     lever: f32,
     noise: f32,
     threshold: f32,
-) -> Result<Option<WeakDirection>, MatchError> {
+) -> Result<Option<DegenerateDirection>, MatchError> {
     // No eigenvalue is smaller than the inverse of the sum of their inverses: most matches need no more.
     if let Some(inverse) = h.inverse()
         && (inverse.xx + inverse.yy + inverse.tt) * threshold < 1.0
@@ -144,7 +144,7 @@ fn weak_direction(
     if second < threshold {
         return Err(MatchError::Degenerate);
     }
-    Ok((least < threshold).then(|| WeakDirection {
+    Ok((least < threshold).then(|| DegenerateDirection {
         direction,
         lever,
         sigma: math::sqrt(noise / math::max(least, 1e-3)),

@@ -18,7 +18,7 @@ pub enum Keep {
 
 /// A turn in equal directions, of which each passes one beam on. 28 bytes.
 #[derive(Debug, Clone)]
-pub struct Bins {
+pub struct Decimator {
     directions: u16,
     keep: Keep,
     /// The beam to pass on, and whether a turn starts with it.
@@ -26,7 +26,7 @@ pub struct Bins {
     dropped: u32,
 }
 
-impl Bins {
+impl Decimator {
     /// So many directions a turn; 0 is taken as 1.
     #[must_use]
     pub const fn new(directions: u16, keep: Keep) -> Self {
@@ -77,7 +77,7 @@ mod tests {
     use crate::scan::{Bearing, Range};
 
     fn pass(keep: Keep, beams: &[(u16, u32, bool)]) -> heapless::Vec<(u16, u16, bool), 16> {
-        let mut bins = Bins::new(16, keep);
+        let mut decimator = Decimator::new(16, keep);
         let mut passed = heapless::Vec::new();
         for (k, &(bearing, mm, starts)) in beams.iter().enumerate() {
             let beam = Beam {
@@ -86,7 +86,7 @@ mod tests {
                 time_us: k as u32,
                 quality: 0,
             };
-            if let Some((beam, starts)) = bins.push(beam, starts) {
+            if let Some((beam, starts)) = decimator.push(beam, starts) {
                 let mm = beam.range.mm().unwrap_or(0);
                 passed
                     .push((beam.time_us as u16, mm, starts))
@@ -94,7 +94,7 @@ mod tests {
             }
         }
         assert_eq!(
-            bins.dropped_beams() as usize + passed.len() + 1,
+            decimator.dropped_beams() as usize + passed.len() + 1,
             beams.len()
         );
         passed

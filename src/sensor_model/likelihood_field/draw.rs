@@ -22,7 +22,7 @@ pub trait Canvas {
 
 /// How neighbours are told from strangers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StampConfig {
+pub struct DrawConfig {
     /// Neighbours on each side that a piece is laid through. Default 3.
     pub neighbours: usize,
     /// Two beams' ends at most this far apart always belong together (mm). Default 40.
@@ -33,7 +33,7 @@ pub struct StampConfig {
     pub straight_mm: u16,
 }
 
-impl StampConfig {
+impl DrawConfig {
     /// For lidars with 1 cm of range noise.
     pub const DEFAULT: Self = Self {
         neighbours: 3,
@@ -43,7 +43,7 @@ impl StampConfig {
     };
 }
 
-impl Default for StampConfig {
+impl Default for DrawConfig {
     fn default() -> Self {
         Self::DEFAULT
     }
@@ -68,7 +68,7 @@ pub fn scan<C: Canvas + ?Sized>(
     points: &[ScanPoint],
     map_from_lidar: Pose,
     profile: &Profile,
-    config: &StampConfig,
+    config: &DrawConfig,
 ) {
     if !map_from_lidar.is_finite() {
         return;
@@ -101,7 +101,7 @@ pub fn scan<C: Canvas + ?Sized>(
 }
 
 /// The piece around one point; `None` where there is no such point.
-fn piece(points: &[ScanPoint], index: usize, config: &StampConfig) -> Option<Piece> {
+fn piece(points: &[ScanPoint], index: usize, config: &DrawConfig) -> Option<Piece> {
     let here = points.get(index)?;
     let at = |point: &ScanPoint| Point::new(f32::from(point.x), f32::from(point.y));
     let alone = Piece {
@@ -128,7 +128,7 @@ fn piece(points: &[ScanPoint], index: usize, config: &StampConfig) -> Option<Pie
 }
 
 /// A wall seen at so flat an angle that its beams lie far apart: the point is in line with both its neighbours.
-fn slanted(points: &[ScanPoint], index: usize, config: &StampConfig) -> Option<Piece> {
+fn slanted(points: &[ScanPoint], index: usize, config: &DrawConfig) -> Option<Piece> {
     let run = points.get(index.checked_sub(1)?..=index + 1)?;
     let here = Point::new(
         f32::from(points.get(index)?.x),
@@ -139,7 +139,7 @@ fn slanted(points: &[ScanPoint], index: usize, config: &StampConfig) -> Option<P
 }
 
 /// Whether two beams in a row end on the same surface.
-fn together(pair: &[ScanPoint], config: &StampConfig) -> bool {
+fn together(pair: &[ScanPoint], config: &DrawConfig) -> bool {
     let [a, b] = pair else { return false };
     let (dx, dy) = (
         i32::from(a.x) - i32::from(b.x),
@@ -305,13 +305,13 @@ mod tests {
             .collect();
         for (index, x) in [(0, 2000.0), (5, 2000.0), (6, 5000.0), (11, 5000.0)] {
             // Points are whole millimetres: 1 mm over a piece of 100 mm.
-            let piece = piece(&points, index, &StampConfig::DEFAULT).expect("a point");
+            let piece = piece(&points, index, &DrawConfig::DEFAULT).expect("a point");
             assert!((piece.middle.x - x).abs() < 1.5, "{index}: {piece:?}");
             assert!(
                 piece.along.x.abs() < 0.02 && piece.half > 10.0,
                 "{index}: {piece:?}"
             );
         }
-        assert_eq!(piece(&points, 12, &StampConfig::DEFAULT), None);
+        assert_eq!(piece(&points, 12, &DrawConfig::DEFAULT), None);
     }
 }
