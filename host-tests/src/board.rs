@@ -2,13 +2,13 @@
 
 pub mod bench;
 pub mod card;
+pub mod commands;
 pub mod drivers;
 pub mod emulator;
 pub mod fields;
 pub mod firmware;
 pub mod maps;
 pub mod real;
-pub mod recording;
 pub mod rp2040js;
 pub mod start;
 pub mod stream;
@@ -21,9 +21,9 @@ use beamfix_app::{
     telemetry::{Cost, Health, Reset, Telemetry},
 };
 
+use commands::Commands;
 use emulator::Count;
 use firmware::Firmware;
-use recording::Recording;
 
 /// An emulated board.
 #[derive(Debug)]
@@ -149,16 +149,16 @@ impl Board {
         self.firmware.build_test(test)
     }
 
-    /// Runs the application over a recording, in the emulator; the costs are worth something with [`Count::Exact`].
-    pub fn replay(&self, recording: &Recording, count: Count) -> Result<Replay> {
+    /// Runs the application over commands, in the emulator; the costs are worth something with [`Count::Exact`].
+    pub fn replay(&self, commands: &Commands, count: Count) -> Result<Replay> {
         let elf = self.build("replay")?;
-        let sent = emulator::run(self, &elf, recording.bytes(), count)?;
+        let sent = emulator::run(self, &elf, commands.bytes(), count)?;
         Replay::from_bytes(&sent)
             .with_context(|| format!("{}: what the board sent is damaged", self.name))
     }
 }
 
-/// What the application sent over a recording.
+/// What the application sent over commands.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Replay {
     /// In order, without the costs.
@@ -168,12 +168,12 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Runs the application over a recording, here, with room for so many beams: a board's [`Board::beams`].
+    /// Runs the application over commands, here, with room for so many beams: a board's [`Board::beams`].
     #[must_use]
-    pub fn on_host(recording: &Recording, beams: usize) -> Self {
+    pub fn on_host(commands: &Commands, beams: usize) -> Self {
         let mut app = Here::new(beams);
         let mut sent = app.ready().to_vec();
-        for &byte in recording.bytes() {
+        for &byte in commands.bytes() {
             sent.extend_from_slice(app.command(byte));
         }
         Self::from_bytes(&sent).expect("the frames were just made")

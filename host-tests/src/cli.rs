@@ -11,7 +11,6 @@ mod pairs;
 mod prior;
 mod replay;
 mod simulate;
-mod track;
 mod verify;
 mod watch;
 

@@ -6,7 +6,7 @@ pub use beamfix::lidar::choice::{WithParser, with_parser};
 use beamfix::lidar::{Counters, Family, Model, Packet, Protocol, identify};
 use beamfix::scan::Beam;
 
-use crate::timed::{self, Content};
+use crate::formats::capture::{self, Content};
 
 /// Names that [`decode`] knows.
 pub fn names() -> impl Iterator<Item = &'static str> {
@@ -77,14 +77,14 @@ impl std::error::Error for DecodeError {}
 /// The model called `name`; for `auto`, the one that `bytes` name or are most likely from.
 pub fn model(name: &str, bytes: &[u8]) -> Result<&'static Model, DecodeError> {
     let name = match name {
-        "auto" => timed::lidar(bytes).unwrap_or(name),
+        "auto" => capture::lidar(bytes).unwrap_or(name),
         _ => name,
     };
     if name != "auto" {
         return Model::named(name).ok_or_else(|| DecodeError::UnknownLidar(name.into()));
     }
     // A second of the fastest line holds what there is to know.
-    let bytes = timed::plain(bytes);
+    let bytes = capture::plain(bytes);
     let start = bytes.get(..100_000).unwrap_or(&bytes);
     match identify::identify(start) {
         Some(finding) => Ok(finding.model),
@@ -98,7 +98,7 @@ pub fn model(name: &str, bytes: &[u8]) -> Result<&'static Model, DecodeError> {
 }
 
 /// Decodes `bytes` of the sensor called `name`, or of the one they are from for `auto`; each measurement goes to `sink`
-/// in order. Where the bytes have times ([`timed`]), so have the measurements of sensors without a clock.
+/// in order. Where the bytes have times ([`capture`]), so have the measurements of sensors without a clock.
 pub fn decode(name: &str, bytes: &[u8], sink: &mut dyn FnMut(Row)) -> Result<Summary, DecodeError> {
     let model = model(name, bytes)?;
     // A scanner that does not see all around counts to both sides.
@@ -123,7 +123,7 @@ impl WithParser for Decoding<'_> {
 
     fn run<P: Protocol>(self, mut parser: P) -> Summary {
         let mut summary = Summary::default();
-        let pieces = timed::pieces(self.bytes);
+        let pieces = capture::pieces(self.bytes);
         for (k, piece) in pieces.iter().enumerate() {
             let Content::Bytes(bytes) = piece.content else {
                 continue;

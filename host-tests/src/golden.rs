@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use beamfix::geometry::Pose;
 
-use crate::board::recording::Recording;
-use crate::hash::PoseHash;
+use crate::board::commands::Commands;
+use crate::formats::{self, Recorded, capture};
 use crate::pipeline::Pipeline;
-use crate::readers::{self, Recorded, capture};
+use crate::report::hash::PoseHash;
 use crate::shared;
 use beamfix_sim::encoder::ld06::{POINTS, Sensor};
 use beamfix_sim::{Settings, TruePose};
@@ -21,7 +21,7 @@ pub struct Golden {
     /// What it is.
     pub what: &'static str,
     /// As it reaches a board.
-    pub recording: Recording,
+    pub commands: Commands,
     scans: Vec<Recorded>,
 }
 
@@ -45,9 +45,9 @@ pub fn simulated() -> Result<Golden> {
         ..Settings::DEFAULT
     };
     let drive = beamfix_sim::drive(&settings, &mut Sensor::ld06());
-    let (turns, summary) = capture::turns("ld06", &drive.bytes)?;
+    let (turns, summary) = capture::log::turns("ld06", &drive.bytes)?;
     let frame = drive.bytes.len() / summary.packets.max(1) as usize;
-    let mut recording = Recording::new();
+    let mut commands = Commands::new();
     let mut scans = Vec::new();
     let mut sent = 0;
     for turn in turns {
@@ -58,8 +58,8 @@ pub fn simulated() -> Result<Golden> {
         let wheels: Pose = moment.wheels.into();
         // The packet with the next turn's first beam completes this turn: the wheels come before it.
         let before = turn.ends_at / POINTS * frame;
-        recording.lidar(&drive.bytes[sent..before]);
-        recording.wheels(wheels);
+        commands.lidar(&drive.bytes[sent..before]);
+        commands.wheels(wheels);
         sent = before;
         scans.push(Recorded {
             stamp: moment.time.to_string(),
@@ -67,11 +67,11 @@ pub fn simulated() -> Result<Golden> {
             wheels: Some(wheels),
         });
     }
-    recording.lidar(&drive.bytes[sent..]);
+    commands.lidar(&drive.bytes[sent..]);
     Ok(Golden {
         name: "simulated",
         what: "60 s in the simulated flat, as LD06 bytes",
-        recording,
+        commands,
         scans,
     })
 }
@@ -82,12 +82,12 @@ fn intel() -> Result<Option<Golden>> {
     else {
         return Ok(None);
     };
-    let mut log = readers::read(&path)?;
+    let mut log = formats::read(&path)?;
     log.scans.truncate(INTEL);
     Ok(Some(Golden {
         name: "intel-1000",
         what: "the first 1000 scans of intel.log",
-        recording: Recording::of_log(&log.scans),
+        commands: Commands::of_log(&log.scans),
         scans: log.scans,
     }))
 }
@@ -224,7 +224,7 @@ mod tests {
         let golden = Golden {
             name: "x",
             what: "x",
-            recording: Recording::new(),
+            commands: Commands::new(),
             scans: Vec::new(),
         };
         assert_eq!(

@@ -14,8 +14,8 @@ use beamfix::sensor_model::{
     beam_model::learning::{ByIncidence, Learner},
 };
 
-use crate::map_file::{self, Map};
-use crate::readers::Log;
+use crate::formats::Log;
+use crate::formats::ros_map::{self, Map};
 
 /// A beam with what the map says of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,8 +92,8 @@ fn lidar_poses(log: &Log) -> impl Iterator<Item = (usize, Pose)> + '_ {
 pub fn pairs(log: &Log, map: &Map, range_max: f32) -> Vec<Pair> {
     let stops = |byte: u8| occupancy::cell(byte) != Cell::Free;
     let mut roots = vec![0; map.shape().len()];
-    distance::roots(&map_file::squares(map, stops), &mut roots);
-    let walls = map_file::squares(map, occupancy::is_occupied);
+    distance::roots(&ros_map::squares(map, stops), &mut roots);
+    let walls = ros_map::squares(map, occupancy::is_occupied);
     let grid = map.as_slice();
     let cast = Skipping::new(grid, &roots).expect("a distance a cell");
     let longest = (beamfix::math::min(range_max, 65.0) * 1000.0) as u16;

@@ -1,19 +1,13 @@
-//! Host side of beamfix: simulator, readers, pictures.
+//! Host side of beamfix: file formats, the emulated boards, reports, and the pipeline on a PC.
 
 pub mod board;
 pub mod decode;
+pub mod formats;
 pub mod golden;
-pub mod hash;
 pub mod learn;
-pub mod map_file;
 pub mod matcher;
-pub mod picture;
 pub mod pipeline;
-pub mod readers;
-pub mod recording;
-pub mod score;
+pub mod report;
 pub mod shared;
 pub mod size;
-pub mod telemetry_file;
-pub mod timed;
 pub mod watch;

@@ -5,7 +5,7 @@ use beamfix::matching::icp::{self, IcpConfig, Reference};
 use beamfix::matching::{Match, MatchError};
 use beamfix::scan::{Beam, Points, PointsConfig, Scan};
 
-use crate::readers::pairs::{Pair, Pairs};
+use crate::formats::pairs::{Pair, Pairs};
 
 /// A matcher with its memory.
 pub struct Matcher<const N: usize> {

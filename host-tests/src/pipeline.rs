@@ -4,7 +4,7 @@ use beamfix::geometry::{Point, Pose, Twist};
 use beamfix::odometry::{Counters, Odometry, OdometryConfig, Step};
 use beamfix::scan::{Beam, Scan};
 
-use crate::hash::PoseHash;
+use crate::report::hash::PoseHash;
 
 /// Odometry over a sequence of scans, with its books.
 pub struct Pipeline<const N: usize> {

@@ -8,13 +8,11 @@ use beamfix_app::{
     telemetry::{Health, Quality, Ready, Telemetry},
 };
 
-use crate::{
-    hash::PoseHash,
-    picture::{
-        colour,
-        map::{Map, Path},
-    },
-    timed::{Content, Recorder},
+use crate::formats::capture::{Content, Recorder};
+use crate::report::hash::PoseHash;
+use crate::report::picture::{
+    colour,
+    map::{Map, Path},
 };
 
 /// About so many points are drawn.

@@ -13,7 +13,7 @@ use super::{
     card::keep,
     emulator::{self, Count},
 };
-use crate::readers::pairs::{self, Pair};
+use crate::formats::pairs::{self, Pair};
 use beamfix_sim::{Noise, Still, TruePose, scenes};
 
 /// Every board with every matcher that has room on it.

@@ -7,7 +7,7 @@ use beamfix_app::telemetry::Cost;
 use object::{Object as _, ObjectSection as _, SectionFlags, SectionKind};
 use serde::{Deserialize, Serialize};
 
-use super::{Board, emulator::Count, real::RealCard, recording::Recording, root};
+use super::{Board, commands::Commands, emulator::Count, real::RealCard, root};
 use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::ld06::Sensor;
 
@@ -50,23 +50,23 @@ impl Card {
 
 /// The drive that the cards are measured over: the first 20 s through the simulated flat.
 #[must_use]
-pub fn recording() -> Recording {
+pub fn drive_commands() -> Commands {
     let settings = Settings {
         seconds: 20.0,
         ..Settings::DEFAULT
     };
-    let mut recording = Recording::new();
-    recording.lidar(&drive(&settings, &mut Sensor::ld06()).bytes);
-    recording
+    let mut commands = Commands::new();
+    commands.lidar(&drive(&settings, &mut Sensor::ld06()).bytes);
+    commands
 }
 
 /// Measures a board.
-pub fn measure(board: &Board, recording: &Recording) -> Result<Card> {
+pub fn measure(board: &Board, commands: &Commands) -> Result<Card> {
     let (flash_bytes, ram_bytes) = sizes(
         &board.build("")?,
         &[(board.ram_start, board.ram_start + board.ram_bytes)],
     )?;
-    let replay = board.replay(recording, Count::Exact)?;
+    let replay = board.replay(commands, Count::Exact)?;
     let stack_bytes = replay.costs.iter().map(|cost| cost.stack_bytes).max();
     let mut instructions: Vec<u32> = replay
         .costs

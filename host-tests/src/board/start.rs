@@ -14,7 +14,7 @@ use super::{
     Board,
     emulator::{self, Count},
 };
-use crate::map_file;
+use crate::formats::ros_map;
 use beamfix_sim::{Noise, Still, TruePose, home};
 
 /// Bytes that a step may look up: 20 ms at 168 MHz or so.
@@ -58,8 +58,8 @@ struct Scene {
 fn scene() -> Result<Scene> {
     let world = home::home();
     let (low, high) = home::EXTENT;
-    let map = map_file::of_world(&world, low, high, 0.05, home::INSIDE)?;
-    let squares = map_file::squares(&map, beamfix::grid::occupancy::is_occupied);
+    let map = ros_map::of_world(&world, low, high, 0.05, home::INSIDE)?;
+    let squares = ros_map::squares(&map, beamfix::grid::occupancy::is_occupied);
     let profile = Profile::new(&FieldModel::DEFAULT);
     let cells = vec![0; map.shape().len()];
     let field = LikelihoodField::from_map(&map.as_slice(), &squares, &profile, cells)?;

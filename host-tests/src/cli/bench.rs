@@ -4,14 +4,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Result, ensure};
-use host_tests::{
-    board::{
-        Board,
-        bench::{self, Outcome, Which},
-    },
-    hash::PoseHash,
-    readers::pairs::{self, Pair},
+use host_tests::board::{
+    Board,
+    bench::{self, Outcome, Which},
 };
+use host_tests::formats::pairs::{self, Pair};
+use host_tests::report::hash::PoseHash;
 use serde_json::json;
 
 use super::output;

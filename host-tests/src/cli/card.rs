@@ -33,7 +33,7 @@ pub struct Args {
 
 /// Builds, runs, reports.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let recording = card::recording();
+    let commands = card::drive_commands();
     let only = args.board.as_deref();
     let real: Vec<&Real> = match only {
         Some(name) => Real::named(name).into_iter().collect(),
@@ -50,7 +50,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = output::progress(boards.len() + real.len() + models, "boards");
     let mut cards = Vec::new();
     for board in &boards {
-        cards.push(card::measure(board, &recording)?);
+        cards.push(card::measure(board, &commands)?);
         bar.inc(1);
     }
     let mut real_cards = Vec::new();

@@ -6,7 +6,10 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
 use beamfix::lidar::identify;
-use host_tests::{decode, readers::bytes, telemetry_file, timed};
+use host_tests::decode;
+use host_tests::formats::bytes;
+use host_tests::formats::capture;
+use host_tests::formats::capture::telemetry;
 use serde_json::json;
 
 use super::output;
@@ -31,8 +34,8 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let name = args.file.display();
     let mut content = bytes::load(&args.file)?;
-    if let Some(recording) = telemetry_file::recording(&content.bytes) {
-        content.bytes = recording;
+    if let Some(capture) = telemetry::capture(&content.bytes) {
+        content.bytes = capture;
     }
     let mut csv = args.csv.as_deref().map(output::create).transpose()?;
     let mut written = Ok(());
@@ -59,7 +62,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 .map_or(String::new(), |path| path.display().to_string())
         })?;
     // A second of the fastest line says what is wrong with it.
-    let bytes = timed::plain(&content.bytes);
+    let bytes = capture::plain(&content.bytes);
     let start = bytes.get(..100_000).unwrap_or(&bytes);
     let hints: Vec<String> = identify::hints(model, start)
         .map(|hint| hint.to_string())

@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use beamfix::grid::occupancy::{self, Cell};
 use beamfix::matching::correlative::pyramid::Pyramid;
 use beamfix::sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile, stored};
-use host_tests::map_file;
+use host_tests::formats::ros_map;
 use serde_json::json;
 
 use super::output;
@@ -40,7 +40,7 @@ pub struct Args {
 
 /// Reads, says how large it becomes, writes.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let map = map_file::read(&args.map)?;
+    let map = ros_map::read(&args.map)?;
     let shape = *map.shape();
     let bytes = stored::HEADER + shape.len();
     let ram = Pyramid::bytes(&shape);
@@ -52,7 +52,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     );
     let model = FieldModel::new(1.0 - args.z_rand, args.z_rand, args.z_max, args.sigma)
         .context("--sigma, --z-rand, --z-max")?;
-    let squares = map_file::squares(&map, occupancy::is_occupied);
+    let squares = ros_map::squares(&map, occupancy::is_occupied);
     let profile = Profile::new(&model);
     let field =
         LikelihoodField::from_map(&map.as_slice(), &squares, &profile, vec![0; shape.len()])?;

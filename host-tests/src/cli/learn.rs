@@ -5,9 +5,10 @@ use std::process::ExitCode;
 
 use anyhow::{Result, ensure};
 use beamfix::sensor_model::BeamModel;
+use host_tests::formats;
+use host_tests::formats::ros_map;
 use host_tests::learn::{self, Pair};
-use host_tests::picture::{self, density::Density};
-use host_tests::{map_file, readers};
+use host_tests::report::picture::{self, density::Density};
 use serde_json::{Value, json};
 
 use super::output;
@@ -48,7 +49,7 @@ pub struct Args {
 
 /// Learns and reports.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let log = readers::read(&args.log)?;
+    let log = formats::read(&args.log)?;
     let ranges = log
         .scans
         .iter()
@@ -62,11 +63,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         args.log.display()
     );
     let map = match &args.map {
-        Some(path) => map_file::read(path)?,
+        Some(path) => ros_map::read(path)?,
         None => learn::map_from_log(&log, args.resolution, range_max)?,
     };
     if let Some(path) = &args.keep_map {
-        map_file::write(&map, path)?;
+        ros_map::write(&map, path)?;
     }
     let pairs = learn::pairs(&log, &map, range_max);
     ensure!(

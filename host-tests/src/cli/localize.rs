@@ -9,9 +9,9 @@ use beamfix::localization::{Localizer, LocalizerConfig, Verdict};
 use beamfix::matching::correlative::pyramid::Pyramid;
 use beamfix::scan::{Mount, Points, PointsConfig, Scan};
 use beamfix::sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile};
-use host_tests::hash::PoseHash;
-use host_tests::map_file;
-use host_tests::readers::Log;
+use host_tests::formats::Log;
+use host_tests::formats::ros_map;
+use host_tests::report::hash::PoseHash;
 
 use super::output;
 use super::replay::Args;
@@ -41,8 +41,8 @@ pub fn replay<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
         .map
         .as_deref()
         .context("--mode localize needs --map MAP.yaml")?;
-    let map = map_file::read(path)?;
-    let squares = map_file::squares(&map, occupancy::is_occupied);
+    let map = ros_map::read(path)?;
+    let squares = ros_map::squares(&map, occupancy::is_occupied);
     let profile = Profile::new(&FieldModel::DEFAULT);
     let cells = vec![0; map.shape().len()];
     let field = LikelihoodField::from_map(&map.as_slice(), &squares, &profile, cells)?;

@@ -8,11 +8,11 @@ use anyhow::{Context, Result};
 use beamfix::geometry::Pose;
 use beamfix::matching::icp::{IcpConfig, Search};
 use clap::ValueEnum;
-use host_tests::hash::PoseHash;
+use host_tests::formats::pairs::{self, Pairs};
 use host_tests::matcher::Matcher;
-use host_tests::picture::{self, pair::PairPicture};
-use host_tests::readers::pairs::{self, Pairs};
-use host_tests::score::{Score, error, is_right, mean, quantile};
+use host_tests::report::hash::PoseHash;
+use host_tests::report::picture::{self, pair::PairPicture};
+use host_tests::report::score::{Score, error, is_right, mean, quantile};
 use host_tests::{size, sized};
 use serde_json::{Value, json};
 

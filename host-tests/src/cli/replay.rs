@@ -10,17 +10,17 @@ use beamfix::odometry::{Counters, OdometryConfig};
 use beamfix::scan::Mount;
 use beamfix_sim::TruePose;
 use clap::ValueEnum;
-use host_tests::hash::PoseHash;
-use host_tests::picture;
+use host_tests::formats::{self, Log, capture};
 use host_tests::pipeline::Pipeline;
-use host_tests::readers::{self, Log, capture};
+use host_tests::report::hash::PoseHash;
+use host_tests::report::picture;
 use host_tests::{size, sized};
 use serde_json::json;
 
 use super::localize::replay as localize_replay;
 use super::output;
 use super::prior::Prior;
-use super::track::{At, Track};
+use host_tests::report::track::{At, Track};
 
 /// Run the firmware's pipeline over a recorded log: CARMEN .log, .lscan, ROS 2 MCAP, a recording of
 /// `simulate` (lidar.rec), or a raw serial capture; packed or not.
@@ -111,8 +111,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bail!("--mode: slam is not built so far");
     }
     let log = match &args.lidar {
-        Some(lidar) => capture::read(&args.log, lidar)?,
-        None => readers::read(&args.log)?,
+        Some(lidar) => capture::log::read(&args.log, lidar)?,
+        None => formats::read(&args.log)?,
     };
     let size = match args.tier {
         Some(tier) => tier as usize,

@@ -14,18 +14,18 @@ use beamfix_sim::encoder;
 use beamfix_sim::lidar::Ranging;
 use beamfix_sim::{Drive, Settings};
 use host_tests::decode::{self, Summary};
-use host_tests::map_file;
-use host_tests::picture;
+use host_tests::formats::capture::log::{self, Turn};
+use host_tests::formats::capture::{Content, Recorder};
+use host_tests::formats::ros_map;
 use host_tests::pipeline::Pipeline;
-use host_tests::readers::capture::{self, Turn};
-use host_tests::recording::Recording;
-use host_tests::timed::{Content, Recorder};
+use host_tests::report::mcap::McapFile;
+use host_tests::report::picture;
 use host_tests::{size, sized};
 use serde_json::json;
 
 use super::output;
 use super::prior::Prior;
-use super::track::{At, Track};
+use host_tests::report::track::{At, Track};
 
 /// Drive a simulated robot through a flat: ray casting, lidar bytes, driver, matcher, pose.
 #[derive(clap::Args)]
@@ -93,14 +93,14 @@ fn write_map(drive: &Drive, path: &Path) -> Result<()> {
     let (low, high) = drive.world.extent();
     let margin = f64::from(3.0 * CELL);
     let start = drive.moments.first().context("nothing was driven")?.truth;
-    let map = map_file::of_world(
+    let map = ros_map::of_world(
         &drive.world,
         low.map(|side| side - margin),
         high.map(|side| side + margin),
         CELL,
         [start.x, start.y],
     )?;
-    map_file::write(&map, path)?;
+    ros_map::write(&map, path)?;
     Ok(())
 }
 
@@ -128,7 +128,7 @@ fn record(
         }
         Ok(recorder.finish()?)
     };
-    let (turns, summary) = capture::turns(model.name, &write(&[])?)?;
+    let (turns, summary) = log::turns(model.name, &write(&[])?)?;
     let path = args.out.join("lidar.rec");
     fs::write(&path, write(&turns)?).with_context(|| path.display().to_string())?;
     Ok((turns, summary))
@@ -156,8 +156,7 @@ fn follow<const N: usize>(
         ..OdometryConfig::DEFAULT
     };
     let mut pipeline = Pipeline::<N>::new(config);
-    let mut recording =
-        Recording::create(&args.out.join("run.mcap"), &["estimate", "truth", "wheels"])?;
+    let mut mcap = McapFile::create(&args.out.join("run.mcap"), &["estimate", "truth", "wheels"])?;
     let mut trajectory = output::create(&args.out.join("trajectory.txt"))?;
     let mut truth = output::create(&args.out.join("truth.txt"))?;
     let mut track = Track::new(origin.truth, settings.mount.into(), DRAWN);
@@ -176,14 +175,14 @@ fn follow<const N: usize>(
             wheels: Some(wheels),
         };
         let points = track.push(at, &turn.beams);
-        recording.push(now.time, &points, &[step.pose, true_pose, wheels])?;
+        mcap.push(now.time, &points, &[step.pose, true_pose, wheels])?;
         for (file, pose) in [(&mut trajectory, step.pose), (&mut truth, true_pose)] {
             writeln!(file, "{:.6} {} {} {}", now.time, pose.x, pose.y, pose.theta)?;
         }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    recording.finish()?;
+    mcap.finish()?;
     trajectory.flush()?;
     truth.flush()?;
 

@@ -54,18 +54,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             run,
             "host, firmware",
             &wanted,
-            &poses(&Replay::on_host(&run.recording, BEAMS)),
+            &poses(&Replay::on_host(&run.commands, BEAMS)),
         ));
         for board in &boards {
             let bar = output::progress(here.len(), board.name);
             bar.tick();
-            let there = board.replay(&run.recording, Count::None)?;
+            let there = board.replay(&run.commands, Count::None)?;
             bar.finish_and_clear();
             // Where there is no room for a whole revolution, it is the host with so little room that must agree.
             match board.beams {
                 BEAMS => table.push(Row::new(run, board.name, &wanted, &poses(&there))),
                 beams => {
-                    let wanted = poses(&Replay::on_host(&run.recording, beams));
+                    let wanted = poses(&Replay::on_host(&run.commands, beams));
                     let machine = format!("{}, {beams} beams", board.name);
                     table.push(Row::new(run, &machine, &wanted, &poses(&there)));
                 }

@@ -12,8 +12,8 @@ use anyhow::{Context, Result, bail};
 use beamfix_app::command::Command;
 use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::ld06::Sensor;
-use host_tests::board::{Board, recording, stream::Stream};
-use host_tests::picture;
+use host_tests::board::{Board, commands::Commands, stream::Stream};
+use host_tests::report::picture;
 use host_tests::watch::Watch;
 use serde_json::json;
 
@@ -128,7 +128,7 @@ impl Live<'_> {
 
     /// Asks whoever listens for beams, and for the lidar's bytes where they are recorded.
     fn ask(&self, commands: &mut impl Write) {
-        let mut asked = recording::Recording::new();
+        let mut asked = Commands::new();
         asked.send(&Command::Send {
             raw: self.args.record.is_some(),
             scans: true,

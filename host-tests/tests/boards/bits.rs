@@ -3,9 +3,10 @@
 use beamfix_app::{BEAMS, telemetry::Telemetry};
 use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::{Echo, Encoder as _, damage, ld06::Sensor};
+use host_tests::formats;
 use host_tests::{
-    board::{BOARDS, Replay, difference, emulator::Count, recording::Recording, stream},
-    readers, shared,
+    board::{BOARDS, Replay, commands::Commands, difference, emulator::Count, stream},
+    shared,
 };
 
 /// Bytes of an LD06 that stands in a square room, 8 m wide, with a door open, and turns by a degree a second.
@@ -35,13 +36,13 @@ fn square_room(turns: u32) -> Vec<u8> {
     ignore = "once is enough: the firmware is always a release build"
 )]
 fn every_board_replays_the_same_bits() {
-    let mut recording = Recording::new();
-    recording.lidar(&square_room(30));
+    let mut commands = Commands::new();
+    commands.lidar(&square_room(30));
     for board in BOARDS {
-        let here = Replay::on_host(&recording, board.beams);
+        let here = Replay::on_host(&commands, board.beams);
         assert!(here.poses().count() >= 27, "{}", here.poses().count());
         let there = board
-            .replay(&recording, Count::None)
+            .replay(&commands, Count::None)
             .unwrap_or_else(|error| panic!("{error:#}"));
         assert_eq!(
             difference(here.poses(), there.poses()),
@@ -74,13 +75,13 @@ fn every_board_replays_a_real_log_to_the_same_bits() {
     let Some(log) = shared::file("datasets/logs/intel.lscan") else {
         return;
     };
-    let log = readers::read(&log).unwrap_or_else(|error| panic!("{error:#}"));
-    let recording = Recording::of_log(&log.scans[..1000]);
+    let log = formats::read(&log).unwrap_or_else(|error| panic!("{error:#}"));
+    let commands = Commands::of_log(&log.scans[..1000]);
     for board in BOARDS {
-        let here = Replay::on_host(&recording, board.beams);
+        let here = Replay::on_host(&commands, board.beams);
         assert_eq!(here.poses().count(), 1000);
         let there = board
-            .replay(&recording, Count::None)
+            .replay(&commands, Count::None)
             .unwrap_or_else(|error| panic!("{error:#}"));
         assert_eq!(
             difference(here.poses(), there.poses()),
@@ -99,10 +100,10 @@ fn a_damaged_line_costs_packets_not_the_run() {
     };
     let drive = drive(&settings, &mut Sensor::ld06());
     let bytes = damage::a_hundredth(&drive.bytes);
-    let mut recording = Recording::new();
-    recording.lidar(&bytes);
-    recording.ask_health();
-    let here = Replay::on_host(&recording, BEAMS);
+    let mut commands = Commands::new();
+    commands.lidar(&bytes);
+    commands.ask_health();
+    let here = Replay::on_host(&commands, BEAMS);
     let poses: Vec<_> = here.poses().collect();
     // A frame of 47 bytes survives with a chance of 0.99^47 = 0.62; a turn whose start is lost joins the next.
     assert!(poses.len() > 80, "{} poses of 200", poses.len());
@@ -121,9 +122,9 @@ fn a_damaged_line_costs_packets_not_the_run() {
     );
     assert!(health.check_errors > 0 && health.skipped_bytes > 47 * (all - good) / 2);
     for board in BOARDS {
-        let here = Replay::on_host(&recording, board.beams);
+        let here = Replay::on_host(&commands, board.beams);
         let there = board
-            .replay(&recording, Count::None)
+            .replay(&commands, Count::None)
             .unwrap_or_else(|error| panic!("{error:#}"));
         assert_eq!(here.messages, there.messages, "{}", board.name);
     }

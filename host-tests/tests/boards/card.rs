@@ -3,7 +3,7 @@
 use crate::common::figures::Risen;
 use host_tests::board::{
     BOARDS,
-    card::{Card, measure, recording},
+    card::{Card, drive_commands, measure},
     real::{REAL, RealCard},
 };
 
@@ -15,10 +15,10 @@ use host_tests::board::{
 fn no_figure_rises() {
     let golden: Vec<Card> =
         serde_json::from_str(include_str!("../../golden/card.json")).expect("a list of cards");
-    let recording = recording();
+    let commands = drive_commands();
     let mut risen = Risen::default();
     for board in BOARDS {
-        let now = measure(board, &recording).unwrap_or_else(|error| panic!("{error:#}"));
+        let now = measure(board, &commands).unwrap_or_else(|error| panic!("{error:#}"));
         println!("{now:?}");
         let before = golden
             .iter()

@@ -8,7 +8,7 @@ use std::time::Duration;
 use beamfix_app::{App, AppConfig, CONFIG, Output, mavlink, telemetry::Reset};
 use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::ld06::Sensor;
-use host_tests::board::{MAVLINK, Replay, recording::Recording, stream::Stream};
+use host_tests::board::{MAVLINK, Replay, commands::Commands, stream::Stream};
 use serde_json::Value;
 
 /// Python with pymavlink, in a folder of its own; `None`, after a line that says why, where it cannot be had.
@@ -87,9 +87,9 @@ fn pymavlink_reads_poses_and_obstacles() {
         sent.extend_from_slice(app.lidar(byte));
     }
     let messages = parsed(&python, "host.mavlink", &sent);
-    let mut recording = Recording::new();
-    recording.lidar(&bytes);
-    let here = Replay::on_host(&recording, beamfix_app::BEAMS);
+    let mut commands = Commands::new();
+    commands.lidar(&bytes);
+    let here = Replay::on_host(&commands, beamfix_app::BEAMS);
     let poses: Vec<_> = here.poses().collect();
     let odometry = of(&messages, "ODOMETRY");
     let obstacles = of(&messages, "OBSTACLE_DISTANCE");

@@ -20,7 +20,7 @@ use beamfix_app::{
 use beamfix_sim::noise::Noise;
 use host_tests::board::{
     BOARDS,
-    recording::Recording,
+    commands::Commands,
     rp2040js::{Job, PICO, Report},
     stream::Stream,
 };
@@ -116,7 +116,7 @@ impl Robot {
             }
             if self.asked.elapsed() > Duration::from_millis(100) {
                 self.asked = Instant::now();
-                let mut ask = Recording::new();
+                let mut ask = Commands::new();
                 ask.ask_health();
                 let commands = self.board.commands().expect("it has a line for commands");
                 commands.write_all(ask.bytes()).expect("it takes commands");

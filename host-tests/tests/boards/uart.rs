@@ -6,9 +6,10 @@
 use beamfix_app::{BEAMS, checks, demo::Demo, telemetry::Telemetry};
 use beamfix_sim::encoder::damage;
 use host_tests::board::{
-    BOARDS, Board, Replay, STM32F4, difference,
+    BOARDS, Board, Replay, STM32F4,
+    commands::Commands,
+    difference,
     firmware::Firmware,
-    recording::Recording,
     rp2040js::{Job, PICO, PICO_EMBASSY},
     stream,
 };
@@ -26,10 +27,10 @@ fn boards() -> impl Iterator<Item = &'static Board> {
 
 /// What the application makes of these bytes here.
 fn here(bytes: &[u8]) -> Replay {
-    let mut recording = Recording::new();
-    recording.lidar(bytes);
-    recording.ask_health();
-    Replay::on_host(&recording, BEAMS)
+    let mut commands = Commands::new();
+    commands.lidar(bytes);
+    commands.ask_health();
+    Replay::on_host(&commands, BEAMS)
 }
 
 /// Every message of the board is the host's, so no byte was lost and every pose is out.

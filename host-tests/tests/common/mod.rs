@@ -15,7 +15,7 @@ use beamfix::{
     },
 };
 use beamfix_sim::{lidar::Still, noise::Noise, pose::TruePose, world::World};
-use host_tests::readers::pairs::{self, Pair};
+use host_tests::formats::pairs::{self, Pair};
 use host_tests::shared;
 
 /// The points of a scan taken at one moment.

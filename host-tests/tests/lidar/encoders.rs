@@ -9,7 +9,7 @@ use beamfix::lidar::{Family, Model, Packet, Protocol};
 use beamfix::scan::{Assembler, Beam};
 use beamfix_sim::encoder::{self, Echo, damage};
 use host_tests::decode::{self, WithParser, with_parser};
-use host_tests::timed;
+use host_tests::formats::capture;
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -292,7 +292,7 @@ fn replayed_bytes_have_their_times() {
         let start_us = 5_000_000.0;
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         let mut sensor = encoder::for_model(&model);
-        let mut recorder = timed::Recorder::new(Vec::new()).expect("memory");
+        let mut recorder = capture::Recorder::new(Vec::new()).expect("memory");
         let mut truth = Vec::new();
         while truth.len() < 8000 {
             let mut line = Vec::new();
@@ -314,7 +314,7 @@ fn replayed_bytes_have_their_times() {
             };
             if !line.is_empty() && !(3000..4000).contains(&truth.len()) {
                 recorder
-                    .push((sent_us + late_us) as u64, timed::Content::Bytes(&line))
+                    .push((sent_us + late_us) as u64, capture::Content::Bytes(&line))
                     .expect("memory");
             }
         }
@@ -347,7 +347,7 @@ fn beams_have_the_times_at_which_they_were_measured() {
     for model in Model::ALL {
         let start_us = 5_000_000.0;
         let mut sensor = encoder::for_model(model);
-        let mut recorder = timed::Recorder::new(Vec::new()).expect("memory");
+        let mut recorder = capture::Recorder::new(Vec::new()).expect("memory");
         let mut truth = Vec::new();
         while sensor.next_time_us() < 4e6 {
             let mut line = Vec::new();
@@ -363,7 +363,7 @@ fn beams_have_the_times_at_which_they_were_measured() {
                 let on_line_us = line.len() as f64 * 1e7 / f64::from(model.baud);
                 let time_us = (sensor.next_time_us() + start_us + on_line_us) as u64;
                 recorder
-                    .push(time_us, timed::Content::Bytes(&line))
+                    .push(time_us, capture::Content::Bytes(&line))
                     .expect("memory");
             }
         }

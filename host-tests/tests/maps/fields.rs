@@ -20,7 +20,7 @@ use beamfix::{
     },
 };
 use beamfix_sim::{home, noise::Noise, pose::TruePose, scenes};
-use host_tests::map_file;
+use host_tests::formats::ros_map;
 
 #[test]
 fn tiles_hold_what_one_table_holds() {
@@ -92,12 +92,12 @@ fn local_map(pose: TruePose, noise: &mut Noise) -> Grid<Vec<u8>> {
 fn local_maps_are_found_in_the_map_and_elsewhere_they_do_not_correlate() {
     let world = home::home();
     let (low, high) = home::EXTENT;
-    let mut whole = map_file::of_world(&world, low, high, 0.05, home::INSIDE).expect("a map");
+    let mut whole = ros_map::of_world(&world, low, high, 0.05, home::INSIDE).expect("a map");
     map::smooth(&mut whole, Kernel::Five);
     let (mut worst, mut elsewhere) = ((0.0f64, 0.0f64), -1.0f32);
     for seed in 0..8 {
         let mut noise = Noise::new(seed, 32);
-        let rough = map_file::of_world(&world, low, high, 0.05, home::INSIDE).expect("a map");
+        let rough = ros_map::of_world(&world, low, high, 0.05, home::INSIDE).expect("a map");
         let truth = home::home_place(&world, &rough, 0.4, &mut noise);
         let mut local = local_map(truth, &mut noise);
         map::smooth(&mut local, Kernel::Five);
@@ -146,10 +146,10 @@ fn folder(name: &str) -> PathBuf {
 fn a_written_map_is_read_back() {
     let folder = folder("maps-written");
     let (low, high) = home::EXTENT;
-    let map = map_file::of_world(&home::home(), low, high, 0.05, home::INSIDE).expect("a map");
+    let map = ros_map::of_world(&home::home(), low, high, 0.05, home::INSIDE).expect("a map");
     let path = folder.join("home.yaml");
-    map_file::write(&map, &path).expect("written");
-    let back = map_file::read(&path).expect("read");
+    ros_map::write(&map, &path).expect("written");
+    let back = ros_map::read(&path).expect("read");
     assert_eq!(back.shape(), map.shape());
     assert_eq!(back.cells(), map.cells());
 }
@@ -166,7 +166,7 @@ fn modes_negation_and_yaw_are_read() {
     let cells = |text: &str| {
         let path = folder.join("m.yaml");
         fs::write(&path, text).expect("written");
-        let map = map_file::read(&path).expect("read");
+        let map = ros_map::read(&path).expect("read");
         (map.cells().to_vec(), *map.shape())
     };
     let head = "image: m.pgm\nresolution: 0.1 # metres\norigin: [1.0, -2.0, 0.5]\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
@@ -252,7 +252,7 @@ fn bad_maps_are_refused_with_a_line_that_says_why() {
         let path = folder.join("m.yaml");
         fs::write(&path, &yaml).expect("written");
         fs::write(folder.join("m.pgm"), &picture).expect("written");
-        let error = format!("{:#}", map_file::read(&path).expect_err(&yaml));
+        let error = format!("{:#}", ros_map::read(&path).expect_err(&yaml));
         assert!(error.contains(says), "{error:?} does not say {says:?}");
         assert!(!error.contains('\n'), "{error:?} is more than a line");
     }

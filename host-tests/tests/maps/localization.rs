@@ -9,7 +9,7 @@ use beamfix::{
     sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile},
 };
 use beamfix_sim::{home, lidar::Still, noise::Noise, pose::TruePose, world::World};
-use host_tests::map_file::{self, Map};
+use host_tests::formats::ros_map::{self, Map};
 
 const BEAMS: usize = 450;
 type Robot<'a> = Localizer<'a, 96>;
@@ -24,8 +24,8 @@ struct Place {
 fn place() -> Place {
     let world = home::home();
     let (low, high) = home::EXTENT;
-    let map = map_file::of_world(&world, low, high, 0.05, home::INSIDE).expect("a map");
-    let squares = map_file::squares(&map, beamfix::grid::occupancy::is_occupied);
+    let map = ros_map::of_world(&world, low, high, 0.05, home::INSIDE).expect("a map");
+    let squares = ros_map::squares(&map, beamfix::grid::occupancy::is_occupied);
     let profile = Profile::new(&FieldModel::DEFAULT);
     let cells = vec![0; map.shape().len()];
     let field =
@@ -362,7 +362,7 @@ fn maps_and_scans_that_say_nothing_give_no_pose() {
         ("all occupied", occupancy::OCCUPIED),
     ] {
         let map = Grid::new(shape, vec![byte; shape.len()]).expect("fits");
-        let squares = map_file::squares(&map, occupancy::is_occupied);
+        let squares = ros_map::squares(&map, occupancy::is_occupied);
         let field =
             LikelihoodField::from_map(&map.as_slice(), &squares, &profile, vec![0; shape.len()])
                 .expect("fits");

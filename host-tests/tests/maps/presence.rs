@@ -9,7 +9,7 @@ use beamfix::{
     sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile, draw::Canvas},
 };
 use beamfix_sim::{home, noise::Noise, pose::TruePose, world::World};
-use host_tests::map_file;
+use host_tests::formats::ros_map;
 
 /// The front of a dock, 0.7 m wide, with a notch 0.12 m deep: x forward, out of the dock.
 const FRONT: [[f64; 2]; 6] = [
@@ -85,7 +85,7 @@ fn faces() -> Vec<Point> {
 fn a_dock_is_found_where_it_stands_and_nowhere_else() {
     let (low, high) = home::EXTENT;
     let empty = home::home();
-    let map = map_file::of_world(&empty, low, high, 0.05, home::INSIDE).expect("a map");
+    let map = ros_map::of_world(&empty, low, high, 0.05, home::INSIDE).expect("a map");
     let field = field();
     let mut buffer = vec![0; Pyramid::bytes(field.grid().shape())];
     let pyramid = Pyramid::new(field.as_slice(), &mut buffer).expect("fits");

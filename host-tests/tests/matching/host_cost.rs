@@ -5,7 +5,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use host_tests::readers::bytes;
+use host_tests::formats::bytes;
 use host_tests::shared;
 
 /// Most instructions a match, from the beams of both scans to the pose.

@@ -6,9 +6,9 @@ use beamfix::geometry::Pose;
 use beamfix::odometry::OdometryConfig;
 use beamfix::scan::Mount;
 use beamfix_sim::TruePose;
+use host_tests::formats::{self, Log};
 use host_tests::pipeline::Pipeline;
-use host_tests::readers::{self, Log};
-use host_tests::score::{self, mean};
+use host_tests::report::score::{self, mean};
 use host_tests::{shared, size, sized};
 
 /// A scan's stamp (s) and where the robot was.
@@ -84,7 +84,7 @@ fn drift_over_recorded_logs_stays_below_what_was_asked_for() {
         let Some(path) = shared::file(&format!("datasets/logs/{name}.log.gz")) else {
             continue;
         };
-        let log = readers::read(&path).expect("the log");
+        let log = formats::read(&path).expect("the log");
         assert_eq!(
             (log.scans.len(), log.skipped, log.cut.is_none()),
             (scans, 0, true),
@@ -112,9 +112,9 @@ fn the_binary_copy_of_a_log_gives_the_same_beams_and_stamps() {
         let Some(path) = shared::file(&format!("datasets/logs/{name}.log.gz")) else {
             continue;
         };
-        let text = readers::read(&path).expect("the log");
+        let text = formats::read(&path).expect("the log");
         let binary =
-            readers::read(&path.with_file_name(format!("{name}.lscan"))).expect("its copy");
+            formats::read(&path.with_file_name(format!("{name}.lscan"))).expect("its copy");
         assert_eq!(text.scans.len(), binary.scans.len());
         for (k, (a, b)) in text.scans.iter().zip(&binary.scans).enumerate() {
             assert_eq!(a.beams.len(), b.beams.len(), "{name}, scan {k}");
@@ -147,7 +147,7 @@ fn low_cost_lidars_are_read_with_their_place_on_the_robot() {
         let Some(path) = shared::file(&format!("datasets/lowcost/{name}.log.gz")) else {
             continue;
         };
-        let log = readers::read(&path).expect("the log");
+        let log = formats::read(&path).expect("the log");
         let mount = log.robot_from_lidar;
         assert_eq!(
             (log.scans.len(), log.scans[0].beams.len(), log.skipped),
@@ -166,7 +166,7 @@ fn a_real_capture_of_an_ld19_stands_still() {
     let Some(path) = shared::file("datasets/serial/ld19-20240828.bin") else {
         return;
     };
-    let log = readers::capture::read(&path, "ld06").expect("the capture");
+    let log = formats::capture::log::read(&path, "ld06").expect("the capture");
     assert!(
         (41..=43).contains(&log.scans.len()),
         "{} turns",

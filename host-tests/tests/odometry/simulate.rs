@@ -7,9 +7,9 @@ use beamfix::scan::Mount;
 use beamfix_sim::encoder::ld06::Sensor;
 use beamfix_sim::{Drive, Settings, drive, scenes};
 use beamfix_sim::{Noise, Still, TruePose};
+use host_tests::formats::capture::log;
 use host_tests::pipeline::Pipeline;
-use host_tests::readers::capture;
-use host_tests::score;
+use host_tests::report::score;
 
 fn run(seed: u64, seconds: f64) -> Drive {
     let settings = Settings {
@@ -56,7 +56,7 @@ fn a_seed_gives_the_same_bytes_every_time_and_on_every_machine() {
 #[test]
 fn the_drive_through_the_flat_ends_within_3_cm_and_half_a_degree() {
     let run = run(Settings::DEFAULT.seed, Settings::DEFAULT.seconds);
-    let (turns, summary) = capture::turns("ld06", &run.bytes).expect("an LD06");
+    let (turns, summary) = log::turns("ld06", &run.bytes).expect("an LD06");
     assert_eq!((summary.check_errors, summary.skipped_bytes), (0, 0));
     let last = run.moments[run.moments.len() - 1];
     assert!(
@@ -97,7 +97,7 @@ fn the_pose_is_as_far_off_as_it_says() {
     let (mut count, mut metres, mut degrees, mut normalised) = (0.0, 0.0, 0.0, 0.0);
     for seed in 1..=8 {
         let run = run(seed, 60.0);
-        let (turns, _) = capture::turns("ld06", &run.bytes).expect("an LD06");
+        let (turns, _) = log::turns("ld06", &run.bytes).expect("an LD06");
         let mut pipeline = pipeline();
         let origin = run.moments[turns[0].ends_at - 1].truth;
         for (number, turn) in turns.iter().enumerate() {
@@ -134,7 +134,7 @@ fn the_pose_is_as_far_off_as_it_says() {
 #[test]
 fn a_gap_between_scans_is_bridged_by_the_wheels() {
     let run = run(1, 30.0);
-    let (turns, _) = capture::turns("ld06", &run.bytes).expect("an LD06");
+    let (turns, _) = log::turns("ld06", &run.bytes).expect("an LD06");
     let mut pipeline = pipeline();
     let origin = run.moments[turns[0].ends_at - 1].truth;
     let mut before = origin;

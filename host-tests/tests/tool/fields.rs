@@ -5,15 +5,16 @@ use std::fs;
 use crate::common::tool::{beamfix, folder, text};
 use beamfix::sensor_model::likelihood_field::stored;
 use beamfix_sim::home;
-use host_tests::{map_file, shared};
+use host_tests::formats::ros_map;
+use host_tests::shared;
 
 #[test]
 fn a_map_becomes_a_table_for_flash() {
     let folder = folder("field-cli");
     let (low, high) = home::EXTENT;
-    let map = map_file::of_world(&home::home(), low, high, 0.05, home::INSIDE).expect("a map");
+    let map = ros_map::of_world(&home::home(), low, high, 0.05, home::INSIDE).expect("a map");
     let yaml = folder.join("home.yaml");
-    map_file::write(&map, &yaml).expect("written");
+    ros_map::write(&map, &yaml).expect("written");
     let table = folder.join("home.field");
     let output = beamfix(&["field", text(&yaml), "--out", text(&table), "--json"]);
     assert!(output.status.success(), "{output:?}");

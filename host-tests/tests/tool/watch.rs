@@ -128,10 +128,10 @@ fn frames_of_a_file_are_drawn_and_recorded_to_the_byte() {
         (&0.into(), &0.into())
     );
     let file = fs::read(&recording).expect("a recording");
-    let kept = host_tests::timed::plain(&file);
+    let kept = host_tests::formats::capture::plain(&file);
     // The last packet may still wait for more.
     assert!(bytes.starts_with(&kept) && kept.len() + 47 >= bytes.len());
-    let times: Vec<u64> = host_tests::timed::pieces(&file)
+    let times: Vec<u64> = host_tests::formats::capture::pieces(&file)
         .iter()
         .skip(1)
         .filter_map(|piece| piece.time_us)

@@ -1,4 +1,4 @@
-//! Raw serial captures: the bytes as they came out of the sensor.
+//! A capture as a log: bytes of a lidar, with times or without, decoded into whole revolutions.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use beamfix::scan::Beam;
 use beamfix::scan::assembler::TurnStarts;
 use beamfix::scan::decimator::{Decimator, Keep};
 
-use super::{Log, Recorded, bytes};
+use super::super::{Log, Recorded, bytes};
 use crate::decode::{self, Summary};
-use crate::telemetry_file;
-use crate::timed::{self, Content};
+use crate::formats::capture::telemetry;
+use crate::formats::capture::{self, Content};
 
 /// Most beams of a turn that are matched; of a finer sensor's, one for each of so many directions.
 pub const MOST_BEAMS: usize = 1024;
@@ -23,9 +23,9 @@ pub struct Turn {
     pub beams: Vec<Beam>,
     /// Beams of the stream up to and with its last one.
     pub ends_at: usize,
-    /// Number of the recording's piece whose bytes completed it.
+    /// Number of the capture's piece whose bytes completed it.
     pub piece: usize,
-    /// Where the wheels said the robot was, if the recording tells.
+    /// Where the wheels said the robot was, if the capture tells.
     pub wheels: Option<Pose>,
 }
 
@@ -52,7 +52,7 @@ pub fn turns(lidar: &str, stream: &[u8]) -> Result<(Vec<Turn>, Summary)> {
         }
         count += 1;
     })?;
-    let mut wheels = timed::pieces(stream)
+    let mut wheels = capture::pieces(stream)
         .into_iter()
         .enumerate()
         .filter_map(|(k, piece)| match piece.content {
@@ -86,9 +86,13 @@ pub fn read(path: &Path, lidar: &str) -> Result<Log> {
 }
 
 /// Reads a capture that was loaded already.
-pub(super) fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Result<Log> {
-    if let Some(recording) = telemetry_file::recording(&content.bytes) {
-        content.bytes = recording;
+pub(in crate::formats) fn parse(
+    name: &str,
+    mut content: bytes::Content,
+    lidar: &str,
+) -> Result<Log> {
+    if let Some(capture) = telemetry::capture(&content.bytes) {
+        content.bytes = capture;
     }
     let (turns, summary) = turns(lidar, &content.bytes)?;
     ensure!(
@@ -103,7 +107,7 @@ pub(super) fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Res
         summary.packets,
         summary.points
     );
-    let mount = timed::pieces(&content.bytes)
+    let mount = capture::pieces(&content.bytes)
         .into_iter()
         .find_map(|piece| match piece.content {
             Content::Mount(pose) => Some(pose),

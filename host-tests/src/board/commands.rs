@@ -1,4 +1,4 @@
-//! What reaches a board, as the bytes of its command line.
+//! The bytes of a board's command line: commands in order, framed.
 
 use beamfix::{geometry::Pose, scan::Beam};
 use beamfix_app::{
@@ -6,15 +6,15 @@ use beamfix_app::{
     link,
 };
 
-use crate::readers::Recorded;
+use crate::formats::Recorded;
 
-/// Commands in order, framed.
+/// Framed commands in the order in which a board receives them.
 #[derive(Debug, Clone, Default)]
-pub struct Recording {
+pub struct Commands {
     bytes: Vec<u8>,
 }
 
-impl Recording {
+impl Commands {
     /// Nothing yet.
     #[must_use]
     pub fn new() -> Self {
@@ -59,18 +59,18 @@ impl Recording {
     /// Scans of a log, each with its wheel odometry.
     #[must_use]
     pub fn of_log(scans: &[Recorded]) -> Self {
-        let mut recording = Self::new();
+        let mut commands = Self::new();
         for recorded in scans {
-            recording.scan(&recorded.beams);
+            commands.scan(&recorded.beams);
             if let Some(pose) = recorded.wheels {
-                recording.wheels(pose);
+                commands.wheels(pose);
             }
         }
         // The last one is complete when another begins.
         if let Some(next) = scans.last().and_then(|recorded| recorded.beams.first()) {
-            recording.scan(&[*next]);
+            commands.scan(&[*next]);
         }
-        recording
+        commands
     }
 
     /// Any command.

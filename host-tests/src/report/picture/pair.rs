@@ -10,7 +10,7 @@ use plotters::prelude::*;
 
 use super::axes::{bounds, dots, header, line, metres};
 use super::{Drawing, colour};
-use crate::score::quantile;
+use crate::report::score::quantile;
 use beamfix_sim::TruePose;
 
 /// A current point in the reference's frame, with the place on the reference's line that it is drawn to.

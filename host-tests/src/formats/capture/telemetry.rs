@@ -1,15 +1,15 @@
-//! What a board has sent, as a recording: its frames with the lidar's bytes, where it was told to send them.
+//! A board's telemetry as a capture: its frames with the lidar's bytes, where it was told to send them.
 
 use beamfix_app::link::Receiver;
 use beamfix_app::telemetry::Telemetry;
 
-use crate::timed::{Content, MAGIC, Recorder};
+use crate::formats::capture::{Content, MAGIC, Recorder};
 
-/// A file of a board's frames as a recording ([`crate::timed`]); `None` for any other file.
+/// A file of a board's frames as a capture ([`super`]); `None` for any other file.
 ///
 /// The board's clock wraps after 71 minutes; here it goes on. Other frames are left out, damaged ones too.
 #[must_use]
-pub fn recording(file: &[u8]) -> Option<Vec<u8>> {
+pub fn capture(file: &[u8]) -> Option<Vec<u8>> {
     if file.starts_with(MAGIC) {
         return None;
     }
@@ -34,7 +34,7 @@ pub fn recording(file: &[u8]) -> Option<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::timed::{pieces, plain};
+    use crate::formats::capture::{pieces, plain};
     use beamfix_app::{App, CONFIG, command::Command, link};
 
     #[test]
@@ -57,7 +57,7 @@ mod tests {
             app.set_time(start.wrapping_add(43 * k as u32));
             sent.extend_from_slice(app.lidar(byte));
         }
-        let file = recording(&sent).expect("a board's frames");
+        let file = capture(&sent).expect("a board's frames");
         let back = plain(&file);
         // The last piece waits for more.
         assert!(
@@ -75,9 +75,9 @@ mod tests {
         assert!((last - first).abs_diff(whole) < 3000, "{first} {last}");
         // A damaged frame costs its piece only.
         sent[1000] ^= 4;
-        let damaged = recording(&sent).expect("still a board's frames");
+        let damaged = capture(&sent).expect("still a board's frames");
         assert!(plain(&damaged).len() + 100 > back.len());
-        assert_eq!(recording(&line), None);
-        assert_eq!(recording(&file), None);
+        assert_eq!(capture(&line), None);
+        assert_eq!(capture(&file), None);
     }
 }

@@ -1,7 +1,7 @@
-//! Recordings: a lidar's bytes with the times at which they came in, and where the wheels said the robot was.
+//! Captures: a lidar's bytes with the times at which they came in, and where the wheels said the robot was.
 //!
-//! Replayed, the drivers see bit for bit what they saw on the robot. A board's own frames become such a recording by
-//! [`crate::telemetry_file`].
+//! Replayed, the drivers see bit for bit what they saw on the robot. A board's own frames become such a capture by
+//! [`telemetry`], and [`log`] reads one as a log of scans.
 //!
 //! | bytes | |
 //! | --- | --- |
@@ -14,6 +14,9 @@
 //!
 //! All little-endian. Wheels count for the turn that the next bytes complete. Pieces of other kinds are skipped. A file
 //! without this start is bytes of the lidar alone.
+
+pub mod log;
+pub mod telemetry;
 
 use std::borrow::Cow;
 use std::io::{self, Write};
@@ -45,14 +48,14 @@ pub enum Content<'a> {
     Mount(Pose),
 }
 
-/// Records pieces as they come in.
+/// Writes a capture piece by piece.
 #[derive(Debug)]
 pub struct Recorder<W> {
     output: W,
 }
 
 impl<W: Write> Recorder<W> {
-    /// Starts a recording.
+    /// Starts a capture.
     pub fn new(mut output: W) -> io::Result<Self> {
         output.write_all(MAGIC)?;
         Ok(Self { output })
@@ -77,7 +80,7 @@ impl<W: Write> Recorder<W> {
         self.output.write_all(&payload)
     }
 
-    /// Ends the recording.
+    /// Ends the capture.
     pub fn finish(mut self) -> io::Result<W> {
         self.output.flush()?;
         Ok(self.output)
@@ -145,7 +148,7 @@ pub fn plain(file: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(plain)
 }
 
-/// Which lidar a recording names.
+/// Which lidar a capture names.
 #[must_use]
 pub fn lidar(file: &[u8]) -> Option<&str> {
     pieces(file).iter().find_map(|piece| match piece.content {

@@ -10,14 +10,13 @@ pub mod clock;
 pub mod lscan;
 pub mod pairs;
 pub mod ros;
+pub mod ros_map;
 
 use std::path::Path;
 
 use anyhow::{Result, bail};
 use beamfix::geometry::Pose;
 use beamfix::scan::Beam;
-
-use crate::timed;
 
 /// One scan of a log.
 #[derive(Debug, Clone)]
@@ -73,13 +72,13 @@ impl Log {
     }
 }
 
-/// Reads a CARMEN text log, an `.lscan` file, a ROS 2 recording (MCAP) or a recording of a lidar's bytes ([`timed`]),
+/// Reads a CARMEN text log, an `.lscan` file, a ROS 2 recording (MCAP) or a capture ([`capture`]),
 /// packed with gzip or not; the content tells which.
 pub fn read(path: &Path) -> Result<Log> {
     let content = bytes::load(path)?;
     let name = path.display();
-    if content.bytes.starts_with(timed::MAGIC) {
-        return capture::parse(&name.to_string(), content, "auto");
+    if content.bytes.starts_with(capture::MAGIC) {
+        return capture::log::parse(&name.to_string(), content, "auto");
     }
     let mut log = if content.bytes.starts_with(lscan::MAGIC) {
         lscan::parse(&content.bytes).map_err(|error| error.context(name.to_string()))?

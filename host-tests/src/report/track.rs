@@ -1,17 +1,18 @@
 //! What a run leaves behind: poses, points and errors, and the pictures of them.
 
+use crate::pipeline::places;
+use crate::report::picture::{chart::Errors as Chart, colour, map::Map, map::Path};
+use crate::report::score;
 use beamfix::geometry::{Point, Pose};
 use beamfix::scan::Beam;
 use beamfix_sim::{TruePose, World};
-use host_tests::picture::{chart::Errors as Chart, colour, map::Map, map::Path};
-use host_tests::pipeline::places;
-use host_tests::score;
 
 /// A robot at the end of a scan; all poses in the frame in which it started.
 #[derive(Clone, Copy)]
 pub struct At {
     /// Since the start (s).
     pub time: f64,
+    /// Where the pipeline puts it.
     pub estimate: Pose,
     /// Where it really was, if anybody knows.
     pub truth: Option<Pose>,
@@ -33,8 +34,11 @@ pub struct Track {
 /// Errors in metres and degrees.
 #[derive(Default)]
 pub struct Errors {
+    /// At the last scan.
     pub last: (f64, f64),
+    /// The largest of all scans, distance and angle each on its own.
     pub largest: (f64, f64),
+    /// Of the wheels' pose at the last scan.
     pub wheels: (f64, f64),
 }
 

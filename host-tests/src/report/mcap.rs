@@ -10,8 +10,8 @@ use beamfix::geometry::{Point, Pose};
 use mcap::records::MessageHeader;
 use serde_json::{Value, json};
 
-/// A recording being written.
-pub struct Recording {
+/// An MCAP file being written.
+pub struct McapFile {
     writer: mcap::Writer<BufWriter<File>>,
     name: String,
     sequence: u32,
@@ -22,7 +22,7 @@ pub struct Recording {
 
 const FRAME: &str = "map";
 
-impl Recording {
+impl McapFile {
     /// Starts a file whose poses are named `poses`; the first one carries the lidar's points.
     pub fn create(path: &Path, poses: &[&str]) -> Result<Self> {
         let name = path.display().to_string();
@@ -62,7 +62,7 @@ impl Recording {
         })
     }
 
-    /// Writes one moment: the points in the robot's frame, and the poses in the order given to [`Recording::create`].
+    /// Writes one moment: the points in the robot's frame, and the poses in the order given to [`McapFile::create`].
     pub fn push(
         &mut self,
         seconds: f64,

@@ -1,0 +1,7 @@
+//! What a run leaves behind: pictures, scores, pose hashes, tracks and MCAP files.
+
+pub mod hash;
+pub mod mcap;
+pub mod picture;
+pub mod score;
+pub mod track;
