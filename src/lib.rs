@@ -13,6 +13,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod config;
 pub mod geometry;
 pub mod grid;
 pub mod lidar;

@@ -34,30 +34,30 @@ use search::Search;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalizerConfig {
     /// Below this quality a scan does not fit (0…1): see [`Quality::value`]. Default 0.38.
-    pub fits: f32,
+    pub min_quality: f32,
     /// From this quality on a scan is no reason for doubt. Default 0.5.
-    pub sure: f32,
+    pub confident_quality: f32,
     /// Unless a greater share of the beams that people do not end went through walls. Default 0.125: at good poses 999 of
     /// 1000 scans have less, at wrong ones that fit otherwise most have more.
-    pub most_through: f32,
+    pub max_wall_crossings: f32,
     /// So many scans in a row that do not fit: lost. Default 3.
-    pub patience: u8,
+    pub max_bad_scans: u8,
     /// And so many that fit, but leave doubts. Default 30.
-    pub doubts: u8,
+    pub max_doubtful_scans: u8,
     /// Mean quality from which on a candidate can be the pose. Default 0.55.
-    pub accept: f32,
+    pub min_candidate_quality: f32,
     /// And so much better than any other, summed over the scans. Default 0.25.
-    pub margin: f32,
+    pub min_margin: f32,
     /// And after so many scans. Default 2.
     pub min_scans: u8,
     /// After so many scans the search starts again if no candidate is accepted. Default 12.
     pub max_scans: u8,
     /// From one heading of the search to the next (rad). Default 0.0349: 2°.
-    pub turn_step: f32,
+    pub heading_step: f32,
     /// While tracking fails, the pose is looked for this far around the prediction (m). Default 0.4.
-    pub reach: f32,
+    pub position_range: f32,
     /// And turned by this much (rad). Default 0.3.
-    pub turn: f32,
+    pub heading_range: f32,
     /// Matching while tracking.
     pub field: FieldConfig,
 }
@@ -65,18 +65,18 @@ pub struct LocalizerConfig {
 impl LocalizerConfig {
     /// For lidars that see all around, in rooms.
     pub const DEFAULT: Self = Self {
-        fits: 0.38,
-        sure: 0.5,
-        most_through: 0.125,
-        patience: 3,
-        doubts: 30,
-        accept: 0.55,
-        margin: 0.25,
+        min_quality: 0.38,
+        confident_quality: 0.5,
+        max_wall_crossings: 0.125,
+        max_bad_scans: 3,
+        max_doubtful_scans: 30,
+        min_candidate_quality: 0.55,
+        min_margin: 0.25,
         min_scans: 2,
         max_scans: 12,
-        turn_step: 0.0349,
-        reach: 0.4,
-        turn: 0.3,
+        heading_step: 0.0349,
+        position_range: 0.4,
+        heading_range: 0.3,
         field: FieldConfig::DEFAULT,
     };
 
@@ -85,7 +85,7 @@ impl LocalizerConfig {
         FieldConfig {
             max_iterations: 8,
             coarse_stride: 1,
-            min_share: 0.1,
+            min_inlier_share: 0.1,
             translation_tolerance: 0.04,
             rotation_tolerance: 0.02,
             ..self.field
@@ -208,7 +208,7 @@ impl<'a, const N: usize> Localizer<'a, N> {
 
     /// Takes a scan; `motion` is the lidar's since the scan before, by odometry, in its own frame.
     ///
-    /// Tracking costs what [`field::align`] costs, a scan that leaves doubts a search of [`LocalizerConfig::reach`]
+    /// Tracking costs what [`field::align`] costs, a scan that leaves doubts a search of [`LocalizerConfig::position_range`]
     /// around, choosing one short match a candidate.
     pub fn update(&mut self, points: &[ScanPoint], motion: Pose) -> Verdict {
         self.counters.scans = self.counters.scans.wrapping_add(1);
@@ -282,8 +282,8 @@ impl<'a, const N: usize> Localizer<'a, N> {
         let mut best = near.map(|found| (found, fitting(&found)));
         if !best.is_some_and(|(_, quality)| self.is_sure(&quality)) {
             let around = CorrelativeConfig {
-                reach: self.config.reach,
-                turn: self.config.turn,
+                position_range: self.config.position_range,
+                heading_range: self.config.heading_range,
                 min_score: 0.2,
                 ..CorrelativeConfig::DEFAULT
             };
@@ -299,7 +299,7 @@ impl<'a, const N: usize> Localizer<'a, N> {
                 }
             }
         }
-        let fits = best.filter(|(_, quality)| quality.value() >= self.config.fits);
+        let fits = best.filter(|(_, quality)| quality.value() >= self.config.min_quality);
         if let Some((found, quality)) = fits {
             self.pose = found.pose;
             self.bad_scans = 0;
@@ -312,7 +312,9 @@ impl<'a, const N: usize> Localizer<'a, N> {
             self.pose = predicted;
             self.bad_scans = self.bad_scans.saturating_add(1);
         }
-        if self.bad_scans >= self.config.patience || self.doubts >= self.config.doubts {
+        if self.bad_scans >= self.config.max_bad_scans
+            || self.doubts >= self.config.max_doubtful_scans
+        {
             self.counters.lost = self.counters.lost.wrapping_add(1);
             self.state = State::Lost;
             // This scan will do for the search.
@@ -323,7 +325,8 @@ impl<'a, const N: usize> Localizer<'a, N> {
 
     /// Whether a scan that fits leaves no doubts.
     fn is_sure(&self, quality: &Quality) -> bool {
-        quality.value() >= self.config.sure && quality.through_share() <= self.config.most_through
+        quality.value() >= self.config.confident_quality
+            && quality.through_share() <= self.config.max_wall_crossings
     }
 
     fn update_lost(&mut self, points: &[ScanPoint]) -> Verdict {
@@ -353,17 +356,19 @@ impl<'a, const N: usize> Localizer<'a, N> {
             candidates: self.hypotheses.len() as u8,
             best: best.mean(),
         };
-        if best.mean() < 0.6 * self.config.accept && scans >= 2 || scans >= self.config.max_scans {
+        if best.mean() < 0.6 * self.config.min_candidate_quality && scans >= 2
+            || scans >= self.config.max_scans
+        {
             self.state = State::Lost;
             return verdict;
         }
         if scans < self.config.min_scans
-            || best.mean() < self.config.accept
-            || best.last < self.config.fits
+            || best.mean() < self.config.min_candidate_quality
+            || best.last < self.config.min_quality
         {
             return verdict;
         }
-        if self.hypotheses.margin() < self.config.margin {
+        if self.hypotheses.margin() < self.config.min_margin {
             return verdict;
         }
         let Hypothesis { pose, .. } = best;

@@ -11,6 +11,7 @@ pub mod virtual_scan;
 use core::fmt;
 
 use crate::{
+    config::ConfigError,
     geometry::Pose,
     linalg::{Covariance, Information},
 };
@@ -38,12 +39,20 @@ pub struct Match {
     pub residual: f32,
     /// The direction that the scene hardly determines, if there is one.
     pub degenerate_direction: Option<DegenerateDirection>,
-    /// Passes over the beams, of all starts.
+    /// Passes over the beams, of all starts; 0 where every pose of a window was tried instead.
     pub iterations: u8,
+    /// What other starts found, where the matcher tries several.
+    pub starts: Option<Starts>,
+}
+
+/// What a matcher that starts from several poses knows of the competition.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Starts {
     /// Starts tried: 1 where the guess was good enough.
-    pub starts: u8,
-    /// What the best pose elsewhere is worth over what this one is: 0 where none was tried, near 1 where the scene looks
-    /// the same from two places.
+    pub tried: u8,
+    /// Score of the best pose found elsewhere, as a share of this one's: 0 where none was found, near 1 where the scene
+    /// looks the same from two places.
     pub rival: f32,
 }
 
@@ -87,8 +96,15 @@ pub enum MatchError {
         /// How many a match needs.
         needed: u16,
     },
-    /// The guess is not a number, or too far off to be one.
+    /// The guess is not a number, or farther away than the matcher can reckon.
     BadGuess,
+    /// A setting is out of its range.
+    BadConfig(ConfigError),
+    /// No pose that was tried reaches the least score.
+    NothingFound {
+        /// The score that was asked for.
+        min_score: f32,
+    },
     /// No direction is determined well enough to say anything.
     Degenerate,
     /// The best pose explains the scan badly.
@@ -126,7 +142,11 @@ impl fmt::Display for MatchError {
                     "only {found} beams agree with the reference, a match needs {needed}"
                 )
             }
-            Self::BadGuess => f.write_str("the guess is not finite or farther than 32 m away"),
+            Self::BadGuess => f.write_str("the guess is not finite or too far away"),
+            Self::BadConfig(error) => write!(f, "a setting cannot be used: {error}"),
+            Self::NothingFound { min_score } => {
+                write!(f, "no pose of the window scores {min_score}")
+            }
             Self::Degenerate => f.write_str("the scene determines no direction well enough"),
             Self::Unlikely { score } => {
                 write!(f, "the best pose explains the scan badly: score {score}")

@@ -56,6 +56,19 @@ pub fn round_to_i32(x: f32) -> i32 {
     (if x < 0.0 { x - 0.5 } else { x + 0.5 }) as i32
 }
 
+/// Whole millimetres in a length (m): 0 for one that is negative or not a number, 65 535 for 65.535 m and more.
+#[must_use]
+pub fn to_mm(metres: f32) -> u16 {
+    let mm = round_to_i32(metres * 1000.0);
+    if mm < 0 {
+        0
+    } else if mm > 0xffff {
+        0xffff
+    } else {
+        mm as u16
+    }
+}
+
 /// `angle` (rad) brought into `[-π, π)`.
 ///
 /// Meant for angles of a few turns; an angle that is not finite is returned as it is.

@@ -58,7 +58,7 @@ pub fn map_from_log(log: &Log, resolution: f32, range_max: f32) -> Result<Map> {
     )?;
     let mut map = Grid::new(shape, vec![occupancy::UNKNOWN; shape.len()])?;
     let config = UpdateConfig {
-        max_range_mm: (reach * 1000.0) as u16,
+        max_range: reach,
         ..UpdateConfig::DEFAULT
     };
     for (scan, pose) in lidar_poses(log) {

@@ -3,7 +3,7 @@
 //! A cell's byte is 128 + 16·ln(p/(1−p)), even; bit 0 marks a cell while a scan is inserted. 128 is unknown.
 
 use super::{Grid, cast::Ray};
-use crate::{geometry::Pose, scan::points::ScanPoint};
+use crate::{geometry::Pose, math, scan::points::ScanPoint};
 
 /// Nothing known: even odds.
 pub const UNKNOWN: u8 = 128;
@@ -58,14 +58,14 @@ pub fn decide(bytes: &mut [u8]) {
 }
 
 /// What one look at a cell is worth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UpdateConfig {
     /// Added where a beam ends (1/16 of log-odds, even). Default 14: p = 0.7.
     pub hit: u8,
     /// Taken off where a beam passes (1/16 of log-odds, even). Default 6: p = 0.4.
     pub miss: u8,
-    /// Longest way that is believed to be free (mm). Default 12 000: an LD06.
-    pub max_range_mm: u16,
+    /// Longest range that is entered, and longest way that is believed to be free (m). Default 12.0: an LD06.
+    pub max_range: f32,
 }
 
 impl UpdateConfig {
@@ -73,7 +73,7 @@ impl UpdateConfig {
     pub const DEFAULT: Self = Self {
         hit: 14,
         miss: 6,
-        max_range_mm: 12_000,
+        max_range: 12.0,
     };
 }
 
@@ -97,11 +97,12 @@ pub fn update<S: AsRef<[u8]> + AsMut<[u8]>>(
     if !map_from_lidar.is_finite() {
         return 0;
     }
+    let max_range_mm = math::to_mm(config.max_range);
     let (hit, miss) = (config.hit & !1, config.miss & !1);
     let shape = *grid.shape();
     let mut entered = 0;
     for point in points {
-        if point.range > config.max_range_mm {
+        if point.range > max_range_mm {
             continue;
         }
         let Some(end) =
@@ -119,8 +120,8 @@ pub fn update<S: AsRef<[u8]> + AsMut<[u8]>>(
         let Some(mut ray) = Ray::new(&shape, map_from_lidar, point.bearing) else {
             break;
         };
-        let range = if point.range > config.max_range_mm {
-            config.max_range_mm
+        let range = if point.range > max_range_mm {
+            max_range_mm
         } else {
             point.range
         };
@@ -198,7 +199,7 @@ mod tests {
     fn beyond_the_range_and_off_the_grid_nothing_is_filled() {
         let mut grid = row();
         let config = UpdateConfig {
-            max_range_mm: 300,
+            max_range: 0.3,
             ..UpdateConfig::DEFAULT
         };
         let far = ScanPoint::at(Bearing(0), 700);

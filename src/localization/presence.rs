@@ -22,9 +22,9 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PresenceConfig {
     /// The object may be this far from the guess (m). Default 0.5.
-    pub reach: f32,
+    pub position_range: f32,
     /// And turned by this much (rad). Default 0.35: 20°.
-    pub turn: f32,
+    pub heading_range: f32,
     /// Fewest beams on it. Default 15.
     pub min_beams: u16,
     /// Least share of the beams that meet its cells and end on its faces, the others being beside them or going through.
@@ -33,7 +33,7 @@ pub struct PresenceConfig {
     /// Least share of its faces' directions, seen from here, in which a beam ends on it. Default 0.8.
     pub min_cover: f32,
     /// It is only known from its front: seen within this angle from its x axis (rad). Default 1.05: 60°.
-    pub view: f32,
+    pub max_view_angle: f32,
     /// Largest root mean square distance of its beams from its faces (m). Default 0.02.
     pub max_residual: f32,
 }
@@ -41,12 +41,12 @@ pub struct PresenceConfig {
 impl PresenceConfig {
     /// For lidars with 1 cm of noise and objects of half a metre to two.
     pub const DEFAULT: Self = Self {
-        reach: 0.5,
-        turn: 0.35,
+        position_range: 0.5,
+        heading_range: 0.35,
         min_beams: 15,
         min_share: 0.9,
         min_cover: 0.8,
-        view: 1.05,
+        max_view_angle: 1.05,
         max_residual: 0.02,
     };
 }
@@ -102,15 +102,15 @@ pub fn find<const N: usize>(
         });
     }
     let around = CorrelativeConfig {
-        reach: config.reach,
-        turn: config.turn,
+        position_range: config.position_range,
+        heading_range: config.heading_range,
         min_score: 0.0,
         ..CorrelativeConfig::DEFAULT
     };
     let coarse = correlator.align(pyramid, &near, lidar_from_object.inverse(), &around)?;
     let fine = FieldConfig {
         min_inliers: config.min_beams,
-        min_share: 0.0,
+        min_inlier_share: 0.0,
         coarse_stride: 1,
         ..FieldConfig::DEFAULT
     };
@@ -139,7 +139,7 @@ pub fn find<const N: usize>(
     let share = f32::from(on) / math::max(f32::from(on) + against, 1.0);
     let seen_from = math::abs(math::atan2(object_from_lidar.y, object_from_lidar.x));
     Ok(Presence {
-        present: seen_from <= config.view
+        present: seen_from <= config.max_view_angle
             && on >= config.min_beams
             && share >= config.min_share
             && cover >= config.min_cover
@@ -173,7 +173,8 @@ fn nearby<const N: usize>(
     let middle = lidar_from_object
         * shape.middle_of(i32::from(shape.width()) / 2, i32::from(shape.height()) / 2);
     let half = |side: u16| 0.5 * f32::from(side) * shape.resolution();
-    let radius = Point::new(half(shape.width()), half(shape.height())).norm() + config.reach;
+    let radius =
+        Point::new(half(shape.width()), half(shape.height())).norm() + config.position_range;
     let within = |point: &&ScanPoint| {
         let off = Point::new(
             f32::from(point.x) * 1e-3 - middle.x,

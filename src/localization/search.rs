@@ -112,7 +112,7 @@ impl<const N: usize> Search<N> {
                 let shape = pyramid.field().shape();
                 let columns = u16::div_ceil(shape.width(), SQUARE as u16);
                 let rows = u16::div_ceil(shape.height(), SQUARE as u16);
-                let step = math::max(config.turn_step, 0.01);
+                let step = math::max(config.heading_step, 0.01);
                 let headings = math::round_to_i32(core::f32::consts::TAU / step).max(1);
                 let x = i32::from(square % columns.max(1)) * SQUARE;
                 let y = i32::from(square / columns.max(1)) * SQUARE;
@@ -223,8 +223,8 @@ impl<const N: usize> Search<N> {
         found: &mut Hypotheses,
     ) {
         let around = CorrelativeConfig {
-            reach: 2.5 * pyramid.field().shape().resolution(),
-            turn: 1.2 * config.turn_step,
+            position_range: 2.5 * pyramid.field().shape().resolution(),
+            heading_range: 1.2 * config.heading_step,
             min_score: 0.05,
             ..CorrelativeConfig::DEFAULT
         };

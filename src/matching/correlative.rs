@@ -8,6 +8,7 @@ pub(crate) mod rotated;
 
 use super::{DegenerateDirection, Match, MatchError};
 use crate::{
+    config::ConfigError,
     geometry::{Point, Pose},
     linalg::{Covariance, Sym3},
     math,
@@ -22,17 +23,17 @@ pub use rotated::sum_four;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CorrelativeConfig {
     /// Half the window's side (m), rounded up to whole blocks of the pyramid's top. Default 0.25.
-    pub reach: f32,
+    pub position_range: f32,
     /// Half the window's angle (rad). Default 0.2094: 12°.
-    pub turn: f32,
+    pub heading_range: f32,
     /// From one heading to the next (rad); 0: as far as the farthest point moves by a cell. Default 0.
-    pub turn_step: f32,
+    pub heading_step: f32,
     /// Least score, 0…1: a share of the peak above unexplored. Default 0.3.
     pub min_score: f32,
     /// Two poses this much alike in score, this far apart, are ambiguous (0…1; above 1: not looked for). Default 2.
-    pub ambiguity: f32,
+    pub max_ambiguity: f32,
     /// Nearer modes are the same pose (m). Default 0.5.
-    pub separation: f32,
+    pub min_separation: f32,
     /// Each beam's log-likelihood counts so much in the covariance: neighbours err alike. Default 0.1.
     pub temper: f32,
 }
@@ -40,12 +41,12 @@ pub struct CorrelativeConfig {
 impl CorrelativeConfig {
     /// Around a good guess, such as wheel odometry.
     pub const DEFAULT: Self = Self {
-        reach: 0.25,
-        turn: 0.2094,
-        turn_step: 0.0,
+        position_range: 0.25,
+        heading_range: 0.2094,
+        heading_step: 0.0,
         min_score: 0.3,
-        ambiguity: 2.0,
-        separation: 0.5,
+        max_ambiguity: 2.0,
+        min_separation: 0.5,
         temper: 0.1,
     };
 }
@@ -106,41 +107,55 @@ pub struct Window {
 }
 
 impl Window {
-    /// `None` if the window has more blocks than fit, the guess is not finite, or the angle more than a turn.
-    #[must_use]
+    /// The window around `guess`.
+    ///
+    /// # Errors
+    /// [`MatchError::BadGuess`] if the guess is not finite, [`MatchError::BadConfig`] if the window has more blocks or
+    /// headings than fit.
     pub fn new(
         pyramid: &Pyramid<'_>,
         points: &[ScanPoint],
         guess: Pose,
         config: &CorrelativeConfig,
-    ) -> Option<Self> {
+    ) -> Result<Self, MatchError> {
         if !guess.is_finite() {
-            return None;
+            return Err(MatchError::BadGuess);
         }
         let shape = pyramid.field().shape();
         let resolution = shape.resolution();
         let farthest = points.iter().map(|point| point.range).max().unwrap_or(1);
         let cell_turn = resolution / math::max(f32::from(farthest) * 1e-3, resolution);
-        let step = if config.turn_step > 0.0 {
-            config.turn_step
+        let step = if config.heading_step > 0.0 {
+            config.heading_step
         } else {
             cell_turn
         };
-        let half_turns = config.turn / step;
-        let half_cells = config.reach / resolution;
-        if !(0.0..5000.0).contains(&half_turns) || !(0.0..8000.0).contains(&half_cells) {
-            return None;
-        }
         // Rounded up, so that the window is never smaller than asked for.
-        let half_turns = math::round_to_i32(half_turns + 0.499) as i16;
-        let half_cells = math::round_to_i32(half_cells + 0.499);
+        let half_headings = math::round_to_i32(config.heading_range / step + 0.499);
+        let half_cells = math::round_to_i32(config.position_range / resolution + 0.499);
         let top = i32::from(pyramid.top_stride());
-        let blocks = (2 * half_cells + top).checked_div(top)?;
-        (blocks <= SIDE).then_some(Self {
+        let out_of_range = |setting, value, max| {
+            MatchError::BadConfig(ConfigError::OutOfRange {
+                setting,
+                value,
+                min: 0.0,
+                max,
+            })
+        };
+        if !(config.heading_range >= 0.0 && half_headings < 5000) {
+            let max = 4999.0 * step;
+            return Err(out_of_range("heading_range", config.heading_range, max));
+        }
+        let blocks = half_cells.saturating_mul(2).saturating_add(top) / top.max(1);
+        if !(config.position_range >= 0.0 && blocks <= SIDE) {
+            let max = (top * SIDE / 2 - 1) as f32 * resolution;
+            return Err(out_of_range("position_range", config.position_range, max));
+        }
+        Ok(Self {
             guess,
             side: (blocks * top) as i16,
             centre: ((blocks * top) / 2) as i16,
-            headings: 2 * half_turns + 1,
+            headings: (2 * half_headings + 1) as i16,
             step,
             resolution,
             axes: shape.origin().theta,
@@ -215,7 +230,7 @@ impl<const N: usize> Correlator<N> {
                 needed: 10,
             });
         }
-        let window = Window::new(pyramid, points, guess, config).ok_or(MatchError::BadGuess)?;
+        let window = Window::new(pyramid, points, guess, config)?;
         let scale = pyramid.field().scale();
         let floor = u32::from(scale.unexplored) * used as u32;
         let height = (255.0 - f32::from(scale.unexplored)) * used as f32;
@@ -224,14 +239,13 @@ impl<const N: usize> Correlator<N> {
         let share = |sum: u32| (sum as f32 - floor as f32) / height;
         let Some(best) = self.search(pyramid, points, &window, least.saturating_sub(1), None)
         else {
-            return Err(MatchError::TooFewCorrespondences {
-                found: 0,
-                needed: math::round_to_i32(config.min_score * used as f32) as u16,
+            return Err(MatchError::NothingFound {
+                min_score: config.min_score,
             });
         };
-        if config.ambiguity <= 1.0 {
-            let limit = floor as f32 + config.ambiguity * (best.sum as f32 - floor as f32);
-            let cells = math::round_to_i32(config.separation / window.resolution) as i16;
+        if config.max_ambiguity <= 1.0 {
+            let limit = floor as f32 + config.max_ambiguity * (best.sum as f32 - floor as f32);
+            let cells = math::round_to_i32(config.min_separation / window.resolution) as i16;
             let turns = math::round_to_i32(0.35 / window.step) as i16;
             let near = Near { best, cells, turns };
             if let Some(other) = self.search(pyramid, points, &window, limit as u32, Some(near)) {
@@ -265,9 +279,8 @@ impl<const N: usize> Correlator<N> {
                 lever,
                 sigma: math::sqrt(largest),
             }),
-            iterations: 1,
-            starts: 1,
-            rival: 0.0,
+            iterations: 0,
+            starts: None,
         })
     }
 

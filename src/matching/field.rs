@@ -30,13 +30,13 @@ pub struct FieldConfig {
     pub coarse_stride: u8,
     /// In the end only beams so near to a surface count (m). Default 0.05: five times a range's noise. What
     /// one scan sees and the other does not would pull.
-    pub inlier_distance: f32,
+    pub max_inlier_distance: f32,
     /// Fewest beams that must end near a surface. Default 20.
     pub min_inliers: u16,
     /// And their least share of all beams. Default 0.3.
-    pub min_share: f32,
+    pub min_inlier_share: f32,
     /// Least noise to assume (m): what the field's cells leave. Default 0.01.
-    pub sigma: f32,
+    pub min_range_sigma: f32,
     /// A direction is degenerate whose curvature is below this share of the strongest one's. Default 0.05: range noise
     /// alone makes up to 0.03 along the bare walls of a corridor.
     pub min_curvature_share: f32,
@@ -49,10 +49,10 @@ impl FieldConfig {
         translation_tolerance: 0.004,
         rotation_tolerance: 0.002,
         coarse_stride: 4,
-        inlier_distance: 0.05,
+        max_inlier_distance: 0.05,
         min_inliers: 20,
-        min_share: 0.3,
-        sigma: 0.01,
+        min_inlier_share: 0.3,
+        min_range_sigma: 0.01,
         min_curvature_share: 0.05,
     };
 }
@@ -85,7 +85,7 @@ pub fn align<F: Field + ?Sized>(
     let mut iterations = 0;
     let gates = (
         gate(field, 2.5 * field.scale().sigma),
-        gate(field, config.inlier_distance),
+        gate(field, config.max_inlier_distance),
     );
     let per_metre = 1.0 / field.shape().resolution();
     // Neighbours are taken together until the steps are short. Then each beam speaks for itself,
@@ -265,7 +265,7 @@ impl Sums {
     }
 
     fn needed(&self, config: &FieldConfig, beams: usize) -> u16 {
-        let share = math::round_to_i32(config.min_share * beams as f32) as u16;
+        let share = math::round_to_i32(config.min_inlier_share * beams as f32) as u16;
         config.min_inliers.max(share) / self.stride.max(1)
     }
 
@@ -374,7 +374,7 @@ impl Sums {
         // A byte below the peak is a squared distance: d² = 2σ²·(255 − b)·step.
         let lost = math::max(255.0 - self.bytes as f32 / inliers, 0.0) * scale.step;
         let residual = scale.sigma * math::sqrt(2.0 * lost);
-        let sigma = math::max(residual, config.sigma);
+        let sigma = math::max(residual, config.min_range_sigma);
         // In beams: a wall's share of one beam is its normal squared. Then per metre and by the noise.
         let per_beam = 1.0 / Self::wall(field);
         let metres = 1.0 / resolution;
@@ -425,8 +425,7 @@ impl Sums {
             score: self.score(beams, scale.unexplored),
             degenerate_direction,
             iterations,
-            starts: 1,
-            rival: 0.0,
+            starts: None,
         })
     }
 }

@@ -2,8 +2,9 @@
 //!
 //! Unlike a likelihood field, it holds it against a pose when free space lies on walls: a check for closed loops.
 
-use super::{DegenerateDirection, Match, MatchError};
+use super::{DegenerateDirection, MatchError};
 use crate::{
+    config,
     geometry::{Point, Pose},
     grid::{Grid, occupancy},
     linalg::{Covariance, Sym3},
@@ -180,12 +181,12 @@ fn smooth_line(cells: &mut [u8], start: usize, step: usize, count: usize, kernel
 /// Where to look, and what counts as found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapConfig {
-    /// Half the window's side (cells of the map), at most 20. Default 4.
-    pub reach: u8,
-    /// Headings on each side of the guess, at most 20. Default 4.
-    pub turns: u8,
+    /// Half the window's side (m), at most 20 cells of the map. Default 0.2.
+    pub position_range: f32,
+    /// Half the window's angle (rad), at most 20 steps. Default 0.07: 4°.
+    pub heading_range: f32,
     /// From one heading to the next (rad). Default 0.0175: 1°.
-    pub turn_step: f32,
+    pub heading_step: f32,
     /// Least correlation about the common mean. Default 0.3.
     pub min_correlation: f32,
     /// Fewest cells that both maps must know. Default 200.
@@ -195,9 +196,9 @@ pub struct MapConfig {
 impl MapConfig {
     /// For local maps of a few metres.
     pub const DEFAULT: Self = Self {
-        reach: 4,
-        turns: 4,
-        turn_step: 0.0175,
+        position_range: 0.2,
+        heading_range: 0.07,
+        heading_step: 0.0175,
         min_correlation: 0.3,
         min_cells: 200,
     };
@@ -209,29 +210,45 @@ impl Default for MapConfig {
     }
 }
 
+/// Where one map lies in another, and how far that can be trusted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct MapMatch {
+    /// Pose of the local map in the other one.
+    pub pose: Pose,
+    /// How far off `pose` may be: position in the map's frame, heading (m², m·rad, rad²).
+    pub covariance: Covariance,
+    /// How alike the two maps are at `pose`.
+    pub correlation: Correlation,
+    /// The direction that the maps do not determine, if there is one.
+    pub degenerate_direction: Option<DegenerateDirection>,
+}
+
 /// Pose of `local` in `map` with the highest correlation about the common mean, tried at every cell and heading of the
 /// window and refined by a parabola along each axis.
 ///
 /// Decide ([`occupancy::decide`]) and smooth both first. Costs [`correlate`] times the poses: 729 by default, and 132 more.
+///
+/// # Errors
+/// [`MatchError::BadGuess`] for a guess that is not finite, [`MatchError::BadConfig`] for a window of more than 20 cells or
+/// headings to a side, [`MatchError::Unlikely`] where the maps are not alike anywhere in it.
 pub fn align(
     map: &Grid<&[u8]>,
     local: &Grid<&[u8]>,
     guess: Pose,
     config: &MapConfig,
-) -> Result<Match, MatchError> {
+) -> Result<MapMatch, MatchError> {
     if !guess.is_finite() {
         return Err(MatchError::BadGuess);
     }
     let resolution = map.shape().resolution();
-    let (reach, turns) = (
-        i32::from(config.reach.min(20)),
-        i32::from(config.turns.min(20)),
-    );
+    let reach = steps("position_range", config.position_range, resolution)?;
+    let turns = steps("heading_range", config.heading_range, config.heading_step)?;
     let pose = |x: f32, y: f32, t: f32| {
         Pose::new(
             guess.x + x * resolution,
             guess.y + y * resolution,
-            guess.theta + t * config.turn_step,
+            guess.theta + t * config.heading_step,
         )
     };
     let score = |x: i32, y: i32, t: i32| {
@@ -273,31 +290,30 @@ pub fn align(
         t as f32 + top(score(x, y, t - 1), score(x, y, t + 1)),
     );
     let found = correlate(map, local, pose);
-    let covariance = spread(value, resolution, config.turn_step, |dx, dy, dt| {
+    let covariance = spread(value, resolution, config.heading_step, |dx, dy, dt| {
         score(x + dx, y + dy, t + dt)
     });
     let lever = 0.5 * f32::from(local.shape().width()) * local.shape().resolution();
     let [_, _, (largest, direction)] = covariance.0.theta_scaled(lever).eigen();
     // Even values over five cells have a σ of 1.41 cells: nothing holds the pose there.
     let flat = 1.2 * resolution;
-    Ok(Match {
+    Ok(MapMatch {
         pose,
         covariance,
-        information: covariance.information().ok_or(MatchError::Degenerate)?,
-        inliers: found.cells.min(65_535) as u16,
-        overlap: found.cells.min(65_535) as u16,
-        beams: local.cells().len().min(65_535) as u16,
-        score: found.common,
-        residual: 0.0,
+        correlation: found,
         degenerate_direction: (largest > flat * flat).then(|| DegenerateDirection {
             direction,
             lever,
             sigma: math::sqrt(largest),
         }),
-        iterations: 1,
-        starts: 1,
-        rival: 0.0,
     })
+}
+
+/// Steps from the middle of the window to its edge.
+fn steps(setting: &'static str, range: f32, step: f32) -> Result<i32, MatchError> {
+    let max = 20.0 * step;
+    config::within(setting, range, 0.0, max).map_err(MatchError::BadConfig)?;
+    Ok(math::round_to_i32(range / step))
 }
 
 /// Covariance of the poses up to two steps around the best, each weighted by its correlation: e-fold in a twentieth.

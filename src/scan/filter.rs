@@ -9,29 +9,29 @@ use crate::math;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FilterConfig {
-    /// Nearest range (mm). Default 0; a robot's own parts are a reason for more.
-    pub nearest_mm: u16,
-    /// Farthest range (mm). Default [`Range::MAX_MM`].
-    pub farthest_mm: u16,
+    /// Shorter ranges are removed (m). Default 0; a robot's own parts are a reason for more.
+    pub min_range: f32,
+    /// Longer ranges are removed (m). Default 65.279: none.
+    pub max_range: f32,
     /// Least quality, in the unit of the beams. Default 0; what counts as weak differs from sensor to sensor.
-    pub least_quality: u8,
+    pub min_quality: u8,
     /// A point is a shadow if it lies on a line with both neighbours that is steeper to the beam than this (cotangent
     /// of the angle between them); 0 keeps all. Default 5.67, an angle of 10°: at an edge, a beam that meets both
     /// surfaces measures something between; a wall seen so flatly is lost, too.
-    pub shadow_slope: f32,
-    /// A point is alone if none of its four nearest neighbours is this near in range (mm); 0 keeps all. Default 0:
+    pub min_shadow_slope: f32,
+    /// A point is alone if none of its four nearest neighbours is this near in range (m); 0 keeps all. Default 0:
     /// thin chair legs are alone as well.
-    pub alone_mm: u16,
+    pub max_neighbour_gap: f32,
 }
 
 impl FilterConfig {
     /// Shadow points only.
     pub const DEFAULT: Self = Self {
-        nearest_mm: 0,
-        farthest_mm: Range::MAX_MM,
-        least_quality: 0,
-        shadow_slope: 5.67,
-        alone_mm: 0,
+        min_range: 0.0,
+        max_range: 65.279,
+        min_quality: 0,
+        min_shadow_slope: 5.67,
+        max_neighbour_gap: 0.0,
     };
 }
 
@@ -64,11 +64,13 @@ impl<const N: usize> Scan<N> {
 
 fn filter(beams: &mut [Stored], config: &FilterConfig) -> Removed {
     let mut removed = Removed::default();
+    let (min_mm, max_mm) = (math::to_mm(config.min_range), math::to_mm(config.max_range));
+    let gap_mm = math::to_mm(config.max_neighbour_gap);
     for beam in beams.iter_mut() {
         let Ok(mm) = beam.range.mm() else { continue };
-        if mm < config.nearest_mm || mm > config.farthest_mm {
+        if mm < min_mm || mm > max_mm {
             removed.range += 1;
-        } else if beam.quality < config.least_quality {
+        } else if beam.quality < config.min_quality {
             removed.quality += 1;
         } else {
             continue;
@@ -77,7 +79,7 @@ fn filter(beams: &mut [Stored], config: &FilterConfig) -> Removed {
     }
     // Neighbours are judged by what they were, so decisions lag behind by the two beams that still look back.
     // 2π/65536 in Q22 times the slope in Q6.
-    let slope_q28 = math::min(config.shadow_slope * 64.0, 64_000.0) as u32 * 402;
+    let slope_q28 = math::min(config.min_shadow_slope * 64.0, 64_000.0) as u32 * 402;
     let mut before = [Place::NONE; 2];
     for k in 0..beams.len() {
         let at = |k: usize| beams.get(k).map_or(Place::NONE, Place::of);
@@ -89,10 +91,10 @@ fn filter(beams: &mut [Stored], config: &FilterConfig) -> Removed {
                 && (previous.mm < this.mm) == (this.mm < next.mm)
                 && this.is_steep_to(previous, slope_q28)
                 && this.is_steep_to(next, slope_q28);
-            let is_alone = config.alone_mm != 0
+            let is_alone = gap_mm != 0
                 && ![previous, earlier, next, later]
                     .iter()
-                    .any(|other| other.mm != 0 && other.mm.abs_diff(this.mm) <= config.alone_mm);
+                    .any(|other| other.mm != 0 && other.mm.abs_diff(this.mm) <= gap_mm);
             removed.shadow += u16::from(is_shadow);
             removed.alone += u16::from(is_alone && !is_shadow);
             if let Some(beam) = beams.get_mut(k).filter(|_| is_shadow || is_alone) {
@@ -162,7 +164,7 @@ mod tests {
     }
 
     const ALL: FilterConfig = FilterConfig {
-        shadow_slope: 0.0,
+        min_shadow_slope: 0.0,
         ..FilterConfig::DEFAULT
     };
 
@@ -170,9 +172,9 @@ mod tests {
     fn near_far_and_weak_beams_go() {
         let mut scan = scan(&[50, 1000, 0, 9000, 1000, 1000]);
         let config = FilterConfig {
-            nearest_mm: 100,
-            farthest_mm: 8000,
-            least_quality: 2,
+            min_range: 0.1,
+            max_range: 8.0,
+            min_quality: 2,
             ..ALL
         };
         let removed = scan.filter(&config);
@@ -203,7 +205,7 @@ mod tests {
     #[test]
     fn points_without_neighbours_go() {
         let config = FilterConfig {
-            alone_mm: 100,
+            max_neighbour_gap: 0.1,
             ..ALL
         };
         let mut scan = scan(&[3000, 3000, 1000, 3000, 0, 3050, 0, 0, 700, 0]);

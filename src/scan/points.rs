@@ -196,14 +196,8 @@ const MAX_RANGE_MM: u16 = 32_000;
 
 /// A limit in whole millimetres, within what a point can hold.
 fn millimetres(metres: f32) -> u16 {
-    let mm = math::round_to_i32(metres * 1000.0);
-    if mm < 0 {
-        0
-    } else if mm > i32::from(MAX_RANGE_MM) {
-        MAX_RANGE_MM
-    } else {
-        mm as u16
-    }
+    let mm = math::to_mm(metres);
+    if mm > MAX_RANGE_MM { MAX_RANGE_MM } else { mm }
 }
 
 impl ScanPoint {

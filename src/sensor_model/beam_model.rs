@@ -5,7 +5,7 @@
 
 pub mod learning;
 
-use super::ConfigError;
+use crate::config::{self, ConfigError};
 use crate::math;
 
 /// The mixture's numbers.
@@ -42,25 +42,25 @@ impl BeamModel {
 
     /// The same, if it is a model: weights from 0.0001 on that sum to one, σ 1 mm…2 m, λ 0.01…20 per metre,
     /// longest range 0.5…100 m.
-    pub fn checked(self) -> Result<Self, ConfigError> {
-        let weights = [self.z_hit, self.z_short, self.z_max, self.z_rand];
-        for value in weights {
-            if !(0.0001..=1.0).contains(&value) {
-                return Err(ConfigError::Weight { value });
-            }
+    ///
+    /// # Errors
+    /// [`ConfigError`] for a number out of its range, or weights that do not sum to 1.
+    pub const fn checked(self) -> Result<Self, ConfigError> {
+        let checks = [
+            config::within("z_hit", self.z_hit, 0.0001, 1.0),
+            config::within("z_short", self.z_short, 0.0001, 1.0),
+            config::within("z_max", self.z_max, 0.0001, 1.0),
+            config::within("z_rand", self.z_rand, 0.0001, 1.0),
+            config::within("sigma", self.sigma, 0.001, 2.0),
+            config::within("lambda", self.lambda, 0.01, 20.0),
+            config::within("range_max", self.range_max, 0.5, 100.0),
+        ];
+        if let Err(error) = config::all(&checks) {
+            return Err(error);
         }
-        let sum = weights.iter().sum();
-        if !(0.999..=1.001).contains(&sum) {
+        let sum = self.z_hit + self.z_short + self.z_max + self.z_rand;
+        if !(sum >= 0.999 && sum <= 1.001) {
             return Err(ConfigError::Sum { sum });
-        }
-        for (value, range) in [
-            (self.sigma, 0.001..=2.0),
-            (self.lambda, 0.01..=20.0),
-            (self.range_max, 0.5..=100.0),
-        ] {
-            if !range.contains(&value) {
-                return Err(ConfigError::Scale { value });
-            }
         }
         Ok(self)
     }
@@ -280,37 +280,30 @@ mod tests {
     fn what_is_no_model_is_refused() {
         let good = BeamModel::DEFAULT;
         assert_eq!(good.checked(), Ok(good));
-        for (bad, error) in [
-            (
-                BeamModel { z_hit: 0.9, ..good },
-                ConfigError::Sum { sum: 1.1 },
-            ),
-            (
-                BeamModel { sigma: 0.0, ..good },
-                ConfigError::Scale { value: 0.0 },
-            ),
+        for (bad, setting) in [
+            (BeamModel { sigma: 0.0, ..good }, "sigma"),
             (
                 BeamModel {
                     z_rand: -0.1,
                     ..good
                 },
-                ConfigError::Weight { value: -0.1 },
+                "z_rand",
+            ),
+            (
+                BeamModel {
+                    lambda: f32::NAN,
+                    ..good
+                },
+                "lambda",
             ),
         ] {
-            let refused = bad.checked().expect_err("bad");
-            assert_eq!(
-                core::mem::discriminant(&refused),
-                core::mem::discriminant(&error),
-                "{refused}"
+            let refused = bad.checked().expect_err(setting);
+            assert!(
+                matches!(refused, ConfigError::OutOfRange { setting: named, .. } if named == setting),
+                "{setting}: {refused}"
             );
         }
-        assert!(
-            BeamModel {
-                lambda: f32::NAN,
-                ..good
-            }
-            .checked()
-            .is_err()
-        );
+        let heavy = BeamModel { z_hit: 0.9, ..good }.checked();
+        assert!(matches!(heavy, Err(ConfigError::Sum { .. })), "{heavy:?}");
     }
 }

@@ -10,8 +10,8 @@ pub mod placement;
 pub mod stored;
 pub mod tiles;
 
-use super::ConfigError;
 use crate::{
+    config::{self, ConfigError},
     geometry::Pose,
     grid::{Grid, GridError, Shape, occupancy},
     math,
@@ -40,22 +40,22 @@ impl FieldModel {
 
     /// Weights of hits and of random returns (0.001…0.999, sum 1), longest range (0.5…100 m), spread of hits
     /// (0.005…1 m).
+    ///
+    /// # Errors
+    /// [`ConfigError`] for a number out of its range, or weights that do not sum to 1.
     pub const fn new(z_hit: f32, z_rand: f32, z_max: f32, sigma: f32) -> Result<Self, ConfigError> {
-        if !(z_hit >= 0.001 && z_hit <= 0.999) {
-            return Err(ConfigError::Weight { value: z_hit });
-        }
-        if !(z_rand >= 0.001 && z_rand <= 0.999) {
-            return Err(ConfigError::Weight { value: z_rand });
+        let checks = [
+            config::within("z_hit", z_hit, 0.001, 0.999),
+            config::within("z_rand", z_rand, 0.001, 0.999),
+            config::within("z_max", z_max, 0.5, 100.0),
+            config::within("sigma", sigma, 0.005, 1.0),
+        ];
+        if let Err(error) = config::all(&checks) {
+            return Err(error);
         }
         let sum = z_hit + z_rand;
         if !(sum > 0.9999 && sum < 1.0001) {
             return Err(ConfigError::Sum { sum });
-        }
-        if !(z_max >= 0.5 && z_max <= 100.0) {
-            return Err(ConfigError::Scale { value: z_max });
-        }
-        if !(sigma >= 0.005 && sigma <= 1.0) {
-            return Err(ConfigError::Scale { value: sigma });
         }
         Ok(Self {
             z_hit,

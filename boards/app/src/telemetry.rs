@@ -207,8 +207,8 @@ impl Found {
                 sigma: weak.sigma,
             }),
             iterations: found.iterations,
-            starts: found.starts,
-            rival: found.rival,
+            starts: found.starts.map_or(1, |starts| starts.tried),
+            rival: found.starts.map_or(0.0, |starts| starts.rival),
         }
     }
 }

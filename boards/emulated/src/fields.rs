@@ -29,8 +29,8 @@ pub const BEAMS: usize = 360;
 
 /// How the search is configured: every board and the host alike.
 pub const SEARCH: CorrelativeConfig = CorrelativeConfig {
-    reach: 0.7,
-    turn: 0.2094,
+    position_range: 0.7,
+    heading_range: 0.2094,
     ..CorrelativeConfig::DEFAULT
 };
 

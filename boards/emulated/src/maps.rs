@@ -116,7 +116,7 @@ impl Maps {
         let found = map::align(&occupied, &other, pose, &map::MapConfig::DEFAULT);
         distance::roots(&self.squares, &mut self.pyramid);
         let hits = f32::from(u8::from(hit.is_some()));
-        Some(hits + found.map_or(0.0, |found| found.score))
+        Some(hits + found.map_or(0.0, |found| found.correlation.common))
     }
 }
 

@@ -26,8 +26,8 @@ pub const BEAMS: usize = 360;
 /// What the board's program has room for: `boards/emulated/src/fields.rs`.
 const FIELD: usize = stored::HEADER + 64 * 64;
 const SEARCH: CorrelativeConfig = CorrelativeConfig {
-    reach: 0.7,
-    turn: 0.2094,
+    position_range: 0.7,
+    heading_range: 0.2094,
     ..CorrelativeConfig::DEFAULT
 };
 const NEWTON: FieldConfig = FieldConfig {

@@ -2,6 +2,7 @@
 
 use crate::common::{field_of, over_pairs, points_from};
 use beamfix::{
+    config::ConfigError,
     geometry::Pose,
     grid::{Grid, Shape},
     matching::{
@@ -77,8 +78,8 @@ fn branch_and_bound_finds_what_trying_everything_finds() {
         let guess = Pose::new(guess.x, guess.y, noise.even(-3.0, 3.0) as f32);
         let reach = if seed % 2 == 0 { 1.5 } else { 0.4 };
         let config = CorrelativeConfig {
-            reach,
-            turn: 0.1,
+            position_range: reach,
+            heading_range: 0.1,
             ..CorrelativeConfig::DEFAULT
         };
         let window = Window::new(&pyramid, &points, guess, &config).expect("fits");
@@ -145,7 +146,7 @@ fn captures_from_a_quarter_metre_and_twelve_degrees() {
             .local();
         // A corner of the window lies 0.35 m from its middle.
         let config = CorrelativeConfig {
-            reach: 0.36,
+            position_range: 0.36,
             ..CorrelativeConfig::DEFAULT
         };
         let first = Correlator::<120>::new()
@@ -216,9 +217,9 @@ fn a_corridor_is_weak_along_itself_and_two_equal_rooms_are_ambiguous() {
     let mut buffer = vec![0; Pyramid::bytes(field.grid().shape())];
     let pyramid = Pyramid::new(field.as_slice(), &mut buffer).expect("fits");
     let config = CorrelativeConfig {
-        reach: 4.0,
-        turn: 0.2,
-        ambiguity: 0.9,
+        position_range: 4.0,
+        heading_range: 0.2,
+        max_ambiguity: 0.9,
         ..CorrelativeConfig::DEFAULT
     };
     let guess = Pose::new(2.5, 1.4, 0.35);
@@ -292,17 +293,25 @@ fn too_few_beams_and_bad_guesses_are_refused() {
         );
     }
     let wide = CorrelativeConfig {
-        reach: 40.0,
+        position_range: 40.0,
         ..config
     };
-    assert_eq!(
-        correlator.align(&pyramid, &points, Pose::IDENTITY, &wide),
-        Err(MatchError::BadGuess)
+    // The window is what is wrong, not the guess.
+    let refused = correlator.align(&pyramid, &points, Pose::IDENTITY, &wide);
+    assert!(
+        matches!(
+            refused,
+            Err(MatchError::BadConfig(ConfigError::OutOfRange {
+                setting: "position_range",
+                ..
+            }))
+        ),
+        "{refused:?}"
     );
     let elsewhere = Pose::new(9.0, 9.0, 0.0);
     let refused = correlator.align(&pyramid, &points, elsewhere, &config);
     assert!(
-        matches!(refused, Err(MatchError::TooFewCorrespondences { .. })),
+        matches!(refused, Err(MatchError::NothingFound { min_score: 0.3 })),
         "{refused:?}"
     );
 }

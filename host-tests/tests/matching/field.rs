@@ -13,8 +13,8 @@ fn scan_to_field_is_as_exact_as_the_scans_allow() {
     let loose = FieldConfig {
         translation_tolerance: 0.2,
         rotation_tolerance: 0.06,
-        inlier_distance: 0.6,
-        min_share: 0.1,
+        max_inlier_distance: 0.6,
+        min_inlier_share: 0.1,
         ..FieldConfig::DEFAULT
     };
     let Some([count, right, mm, degrees]) = over_pairs(1, |pair, reference, current| {

@@ -276,7 +276,7 @@ fn every_minimisation_reaches_its_accuracy() {
                 minimisation: $choice,
                 limits: Limits {
                     // Points slide slowly along walls.
-                    iterations: 100,
+                    max_iterations: 100,
                     ..Limits::DEFAULT
                 },
             })

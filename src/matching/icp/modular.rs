@@ -56,29 +56,29 @@ pub struct Stages<S, C, W, R, M> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Most passes. Default 30.
-    pub iterations: u8,
+    pub max_iterations: u8,
     /// A step shorter than this (m) ... Default 1e-4: a hundredth of the noise of a range.
-    pub translation: f32,
+    pub translation_tolerance: f32,
     /// ... and turning by less than this (rad) ends the loop. Default 1e-4.
-    pub rotation: f32,
+    pub rotation_tolerance: f32,
     /// Fewest pairs that must count. Default 30.
-    pub pairs: u16,
+    pub min_pairs: u16,
     /// Neighbours on each side that a surface's line is laid through. Default 4: 9 points at 1° see 0.3 m of a wall 2 m
     /// away.
     pub neighbours: u8,
     /// Standard deviation of a range (m): the least noise that the covariance assumes. Default 0.01.
-    pub range_sigma: f32,
+    pub min_range_sigma: f32,
 }
 
 impl Limits {
     /// For scans of a few hundred beams.
     pub const DEFAULT: Self = Self {
-        iterations: 30,
-        translation: 1e-4,
-        rotation: 1e-4,
-        pairs: 30,
+        max_iterations: 30,
+        translation_tolerance: 1e-4,
+        rotation_tolerance: 1e-4,
+        min_pairs: 30,
         neighbours: 4,
-        range_sigma: 0.01,
+        min_range_sigma: 0.01,
     };
 }
 
@@ -207,8 +207,9 @@ where
         let step = stages.minimisation.step(pairs, reference, pose);
         let step = determined.part_of(step.ok_or(MatchError::Degenerate)?);
         pose = Pose::new(pose.x + step.x, pose.y + step.y, pose.theta + step.theta);
-        let short = step.distance() < limits.translation && math::abs(step.theta) < limits.rotation;
-        if short || passes >= limits.iterations {
+        let short = step.distance() < limits.translation_tolerance
+            && math::abs(step.theta) < limits.rotation_tolerance;
+        if short || passes >= limits.max_iterations {
             let poses = [guess, pose, step];
             return verdict::judge(pairs, current, &determined, poses, passes, &limits);
         }

@@ -58,7 +58,7 @@ pub struct IcpConfig {
     /// pose had less than 0.3.
     pub min_score: f32,
     /// Standard deviation of a range (m): the least noise that the covariance assumes. Default 0.005.
-    pub range_sigma: f32,
+    pub min_range_sigma: f32,
     /// A direction is degenerate that less than this share of the beams tell. Default 0.02: what the noise of the normals alone
     /// amounts to in a corridor.
     pub min_constraint_share: f32,
@@ -71,7 +71,7 @@ impl IcpConfig {
         coarse_beams: 45,
         min_inliers: 30,
         min_score: 0.25,
-        range_sigma: 0.005,
+        min_range_sigma: 0.005,
         min_constraint_share: 0.02,
     };
 }

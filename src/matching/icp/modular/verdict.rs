@@ -25,7 +25,7 @@ pub(super) fn enough(
     guess: Pose,
     limits: &Limits,
 ) -> Result<(), MatchError> {
-    let needed = limits.pairs;
+    let needed = limits.min_pairs;
     if points.len() < usize::from(needed) {
         let found = points.len() as u16;
         return Err(MatchError::TooFewBeams { found, needed });
@@ -48,7 +48,7 @@ fn counting(pairs: &[Pair]) -> impl Iterator<Item = &Pair> {
 
 /// Refuses passes in which too few pairs count.
 pub(super) fn enough_pairs(pairs: &[Pair], limits: &Limits) -> Result<(), MatchError> {
-    let (found, needed) = (counting(pairs).count() as u16, limits.pairs);
+    let (found, needed) = (counting(pairs).count() as u16, limits.min_pairs);
     if found < needed {
         return Err(MatchError::TooFewCorrespondences { found, needed });
     }
@@ -136,7 +136,10 @@ pub(super) fn judge(
         score += 1.0 / (1.0 + ratio * ratio);
     }
     let residual = math::sqrt(squares / weight);
-    let noise = math::max(residual * residual, limits.range_sigma * limits.range_sigma);
+    let noise = math::max(
+        residual * residual,
+        limits.min_range_sigma * limits.min_range_sigma,
+    );
     let moved = determined.part_of(Pose::new(
         pose.x - guess.x,
         pose.y - guess.y,
@@ -170,8 +173,7 @@ pub(super) fn judge(
         residual,
         degenerate_direction,
         iterations,
-        starts: 1,
-        rival: 0.0,
+        starts: None,
     })
 }
 

@@ -4,7 +4,7 @@ use crate::{
     geometry::Pose,
     linalg::{Covariance, Information, Sym3},
     matching::{
-        DegenerateDirection, Match, MatchError,
+        DegenerateDirection, Match, MatchError, Starts,
         icp::projective::{
             FINE, Task,
             accumulate::{FixedPose, Pass},
@@ -43,7 +43,10 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
     let sums = &best.last.sums;
     let mut h = sums.curvature(task.lever_shift, best.last.at);
     let residual = sums.residual();
-    let noise = math::max(residual * residual, config.range_sigma * config.range_sigma);
+    let noise = math::max(
+        residual * residual,
+        config.min_range_sigma * config.min_range_sigma,
+    );
     let mut pose = best.last.at.pose();
     let degenerate_direction = degenerate_direction(
         &h.theta_scaled(1.0 / lever),
@@ -84,8 +87,10 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         residual,
         degenerate_direction,
         iterations: best.iterations,
-        starts: best.starts,
-        rival: best.ratio,
+        starts: Some(Starts {
+            tried: best.starts,
+            rival: best.ratio,
+        }),
     })
 }
 
