@@ -1,5 +1,9 @@
 //! Points, poses and twists in the plane.
 
+mod ego_motion;
+
+pub use ego_motion::EgoMotion;
+
 use core::ops::Mul;
 
 use crate::math;

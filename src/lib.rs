@@ -16,6 +16,7 @@
 pub mod config;
 pub mod geometry;
 pub mod grid;
+pub mod keyframe;
 pub mod lidar;
 pub mod linalg;
 pub mod localization;

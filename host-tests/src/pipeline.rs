@@ -1,6 +1,6 @@
 //! The firmware's pipeline on the host: beams in, poses out, with the counts and the hash that a report needs.
 
-use beamfix::geometry::{Point, Pose, Twist};
+use beamfix::geometry::{EgoMotion, Point, Pose, Twist};
 use beamfix::odometry::{Counters, Odometry, OdometryConfig, Step};
 use beamfix::scan::{Beam, Scan};
 
@@ -10,6 +10,7 @@ use crate::report::hash::PoseHash;
 pub struct Pipeline<const N: usize> {
     odometry: Odometry<N>,
     scan: Scan<N>,
+    wheels: Option<Pose>,
     /// Beams that found no room because a scan had more than N.
     pub refused_beams: usize,
     /// Over all poses so far.
@@ -21,8 +22,12 @@ impl<const N: usize> Pipeline<N> {
     #[must_use]
     pub fn new(config: OdometryConfig) -> Box<Self> {
         Box::new(Self {
-            odometry: Odometry::new(config),
+            odometry: Odometry::new(OdometryConfig {
+                directions: N as u16,
+                ..config
+            }),
             scan: Scan::new(),
+            wheels: None,
             refused_beams: 0,
             hash: PoseHash::new(),
         })
@@ -40,7 +45,12 @@ impl<const N: usize> Pipeline<N> {
         for &beam in beams {
             self.refused_beams += usize::from(self.scan.push(beam).is_err());
         }
-        let step = self.odometry.update(&self.scan, wheels);
+        let ego = EgoMotion {
+            wheels: (self.wheels.zip(wheels)).map(|(last, now)| last.between(now)),
+            rotation: None,
+        };
+        self.wheels = wheels.filter(|pose| pose.is_finite());
+        let step = self.odometry.update(&self.scan, ego);
         self.hash.push(step.pose);
         step
     }

@@ -1,14 +1,14 @@
-//! Beams one after the other to whole turns.
+//! Beams one after the other to whole revolutions of the lidar.
 
 use super::{Beam, Bearing, Scan};
 
-/// Collects the beams of one turn after the other.
+/// Collects the beams of one revolution after the other.
 ///
 /// Each beam keeps its own bearing, range and time; nothing is binned. 8·N + 64 bytes: one scan, and the one beam
-/// that is already the next turn's when a turn is complete.
-/// A turn whose start was lost on the line ends by itself ([`TurnStarts`]). One whose beams are more than 1.04 s apart was
-/// interrupted, by a cable or a motor: the robot is elsewhere by now, so these beams are refused, and the next whole turn
-/// is the first one reported.
+/// that is already the next revolution's when a revolution is complete.
+/// A revolution whose start was lost on the line ends by itself: it counts as begun when the beams have swept 370° since
+/// the last start. One whose beams are more than 1.04 s apart was interrupted, by a cable or a motor: the robot is
+/// elsewhere by now, so these beams are refused, and the next whole revolution is the first one reported.
 ///
 /// ```
 /// # use beamfix::scan::{Assembler, Beam, Bearing, Range};
@@ -26,35 +26,34 @@ use super::{Beam, Bearing, Scan};
 pub struct Assembler<const N: usize> {
     scan: Scan<N>,
     state: State,
-    starts: TurnStarts,
+    starts: Starts,
     refused: u32,
 }
 
-/// Tells where turns start: where the sensor says so, and where it should have.
+/// Tells where revolutions start: where the sensor says so, and where it should have.
 ///
-/// A lost start would make one turn of two. So one counts as begun when the beams have swept 370° since the last: most
-/// sensors put their zero a little elsewhere in each turn. 8 bytes.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct TurnStarts {
+/// A lost start would make one revolution of two. So one counts as begun when the beams have swept 370° since the last:
+/// most sensors put their zero a little elsewhere in each revolution. 8 bytes.
+#[derive(Debug, Clone, Copy)]
+struct Starts {
     last: Bearing,
-    /// Since the last turn began (2¹⁶ is a turn).
+    /// Angle since the last revolution began (1/65 536 turn).
     swept: i32,
 }
 
-impl TurnStarts {
+impl Starts {
     const TURN: i32 = 1 << 16;
 
     /// Before the first beam.
-    #[must_use]
-    pub const fn new() -> Self {
+    const fn new() -> Self {
         Self {
             last: Bearing(0),
             swept: 0,
         }
     }
 
-    /// Takes the next beam's bearing and what the sensor says; tells whether a turn starts with it.
-    pub fn push(&mut self, bearing: Bearing, says_so: bool) -> bool {
+    /// Takes the next beam's bearing and what the sensor says; tells whether a revolution starts with it.
+    fn push(&mut self, bearing: Bearing, says_so: bool) -> bool {
         let step = bearing.0.wrapping_sub(self.last.0).cast_signed();
         self.last = bearing;
         // Also a sensor that turns to and fro stays within these bounds.
@@ -71,11 +70,11 @@ impl TurnStarts {
 
 #[derive(Debug, Clone, Copy)]
 enum State {
-    /// The first turn is incomplete: nobody knows how much of it is missing.
+    /// The first revolution is incomplete: nobody knows how much of it is missing.
     Partial,
-    /// The scan began with a turn.
+    /// The scan began with a revolution.
     Whole,
-    /// The scan is a whole turn; this beam is the next one's first.
+    /// The scan is a whole revolution; this beam is the next one's first.
     Ready(Beam),
 }
 
@@ -86,31 +85,48 @@ impl<const N: usize> Assembler<N> {
         Self {
             scan: Scan::new(),
             state: State::Partial,
-            starts: TurnStarts::new(),
+            starts: Starts::new(),
             refused: 0,
         }
     }
 
-    /// Takes the next beam; `true` when [`Assembler::scan`] is a whole turn.
+    /// Takes the beams of a packet in order and gives every revolution that they complete to `ready`.
     ///
-    /// `turn_starts` says that this beam is the first of a turn. The scan stays until the next push.
-    pub fn push(&mut self, beam: Beam, turn_starts: bool) -> bool {
-        let turn_starts = self.starts.push(beam.bearing, turn_starts);
+    /// `start` is the number of the beam that is the first of a revolution, if there is one, as the packet's
+    /// `revolution_start` says.
+    pub fn push_packet(
+        &mut self,
+        beams: impl Iterator<Item = Beam>,
+        start: Option<usize>,
+        mut ready: impl FnMut(&Scan<N>),
+    ) {
+        for (k, beam) in beams.enumerate() {
+            if self.push(beam, start == Some(k)) {
+                ready(&self.scan);
+            }
+        }
+    }
+
+    /// Takes the next beam; `true` when [`Assembler::scan`] is a whole revolution.
+    ///
+    /// `starts` says that this beam is the first of a revolution. The scan stays until the next push.
+    pub fn push(&mut self, beam: Beam, starts: bool) -> bool {
+        let starts = self.starts.push(beam.bearing, starts);
         if let State::Ready(first) = self.state {
             self.scan.clear();
             self.keep(first);
             self.state = State::Whole;
         }
-        if matches!(self.state, State::Whole) && !turn_starts && !self.scan.reaches(beam.time_us) {
+        if matches!(self.state, State::Whole) && !starts && !self.scan.reaches(beam.time_us) {
             self.refused = self.refused.wrapping_add(self.scan.len() as u32);
             self.restart();
         }
         match self.state {
-            State::Whole if turn_starts => {
+            State::Whole if starts => {
                 self.state = State::Ready(beam);
                 return true;
             }
-            State::Partial if turn_starts => {
+            State::Partial if starts => {
                 self.scan.clear();
                 self.state = State::Whole;
             }
@@ -121,23 +137,23 @@ impl<const N: usize> Assembler<N> {
         false
     }
 
-    /// The turn that the last push completed, or what there is of the present one.
+    /// The revolution that the last push completed, or what there is of the present one.
     #[must_use]
     pub fn scan(&self) -> &Scan<N> {
         &self.scan
     }
 
-    /// Beams that found no room because a turn had more than N, and what there was of interrupted turns; wraps.
+    /// Beams that found no room because a revolution had more than N, and the beams of interrupted revolutions; wraps.
     #[must_use]
     pub fn refused_beams(&self) -> u32 {
         self.refused
     }
 
-    /// Forgets the present turn: after a pause, the next whole turn is the first one reported.
+    /// Forgets the present revolution: after a pause, the next whole one is the first one reported.
     pub fn restart(&mut self) {
         self.scan.clear();
         self.state = State::Partial;
-        self.starts = TurnStarts::new();
+        self.starts = Starts::new();
     }
 
     fn keep(&mut self, beam: Beam) {
@@ -168,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn every_beam_of_every_whole_turn_is_kept_once() {
+    fn every_beam_of_every_whole_revolution_is_kept_once() {
         let mut assembler = Assembler::<8>::new();
         let mut next = 3;
         for k in 0..40 {
@@ -184,8 +200,8 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_without_its_start_ends_by_itself() {
-        // Both ways around, beams 5° apart; every 72nd starts a turn, some of these are lost.
+    fn a_revolution_without_its_start_ends_by_itself() {
+        // Both ways around, beams 5° apart; every 72nd starts a revolution, some of these are lost.
         for sense in [1u16, u16::MAX] {
             let mut assembler = Assembler::<80>::new();
             let mut lengths = heapless::Vec::<_, 12>::new();
@@ -214,12 +230,12 @@ mod tests {
     }
 
     #[test]
-    fn an_interrupted_turn_is_refused() {
-        // Eight beams a turn, 160 µs apart; none came for a while after beam `last`.
+    fn an_interrupted_revolution_is_refused() {
+        // Eight beams a revolution, 160 µs apart; none came for a while after beam `last`.
         for (pause_us, last, lengths, refused) in [
             (1_040_000, 11, [8, 8, 8].as_slice(), 0),
             (1_060_000, 11, &[8, 8], 4),
-            // Between two turns, and after the first beam of one.
+            // Between two revolutions, and after the first beam of one.
             (1_060_000, 15, &[8, 8, 8], 0),
             (1_060_000, 16, &[8, 8], 1),
             // Back to an earlier time: the clock started over.
@@ -246,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn turns_of_a_single_beam_and_a_restart() {
+    fn revolutions_of_a_single_beam_and_a_restart() {
         let mut assembler = Assembler::<4>::new();
         let ready: [bool; 4] = core::array::from_fn(|k| assembler.push(beam(k as u32), true));
         assert_eq!(ready, [false, true, true, true]);

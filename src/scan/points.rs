@@ -3,7 +3,7 @@
 use crate::{
     geometry::Twist,
     math,
-    scan::{Bearing, Scan, Stored},
+    scan::{Bearing, Mount, Scan, Stored},
 };
 
 /// A place hit by a beam: 8 bytes, all integers.
@@ -23,23 +23,23 @@ pub struct ScanPoint {
 /// What [`Points::assign`] takes and leaves out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointsConfig {
+    /// How the lidar sits on the robot. Default [`Mount::DEFAULT`]: at its centre, upright, looking forward.
+    pub mount: Mount,
     /// Shorter ranges are left out (m). Default 0.05: a cover, the robot's own body.
     pub min_range: f32,
     /// Longer ranges are left out (m), at most 32.0. Default 32.0.
     pub max_range: f32,
-    /// The lidar hangs head down: bearings run the other way round. Default false.
-    pub upside_down: bool,
     /// Scans of more beams are thinned to about so many points by averaging neighbours on one surface: nothing of what
     /// they know is lost, and everything after costs as much less. Default `u16::MAX`: every beam is a point.
     pub max_points: u16,
 }
 
 impl PointsConfig {
-    /// Everything that a point can hold, upright.
+    /// Everything that a point can hold, seen by an upright lidar at the robot's centre.
     pub const DEFAULT: Self = Self {
+        mount: Mount::DEFAULT,
         min_range: 0.05,
         max_range: 32.0,
-        upside_down: false,
         max_points: u16::MAX,
     };
 }
@@ -81,8 +81,7 @@ impl<const N: usize> Points<N> {
         &mut self.points
     }
 
-    /// Places hit by `scan`, as seen by the lidar at the scan's last beam if it moves with `twist` (its own, not
-    /// the robot's).
+    /// Places hit by `scan`, as seen by the lidar at the scan's last beam if the robot moves with `twist`.
     ///
     /// Beams without a return or outside the configured ranges are left out. A scan taken in motion costs more: each beam
     /// is turned and moved.
@@ -92,9 +91,9 @@ impl<const N: usize> Points<N> {
         let sweep = Sweep {
             least,
             span: millimetres(config.max_range).saturating_sub(least),
-            flip: if config.upside_down { 0xffff } else { 0 },
+            flip: if config.mount.upside_down { 0xffff } else { 0 },
             last: scan.last_age(),
-            deskew: Deskew::new(twist, scan.duration()),
+            deskew: Deskew::new(config.mount.lidar_twist(twist), scan.duration()),
         };
         let most = scan.len().div_ceil(usize::from(config.max_points.max(1)));
         for beams in scan.stored().chunks(most.clamp(1, MERGE_MOST)) {
@@ -322,7 +321,10 @@ mod tests {
             &scan,
             Twist::ZERO,
             &PointsConfig {
-                upside_down: true,
+                mount: Mount {
+                    upside_down: true,
+                    ..Mount::DEFAULT
+                },
                 ..PointsConfig::DEFAULT
             },
         );

@@ -25,7 +25,7 @@ pub mod telemetry;
 pub mod text;
 
 use beamfix::{
-    geometry::Pose,
+    geometry::{EgoMotion, Pose},
     lidar::{Packet as _, Protocol as _, ld06, motor::MotorConfig},
     odometry::{Odometry, OdometryConfig, Step},
     scan::{Assembler, Beam},
@@ -47,8 +47,7 @@ const HEALTH_EVERY: u16 = 16;
 /// Longest time that bytes of the lidar wait for others before they are sent on (µs).
 const RAW_US: u32 = 20_000;
 
-/// Most beams of a revolution; further ones are refused and counted. An LD06 sends 450 at 10 Hz. It is also the number
-/// of directions that a keyframe tells apart, so a PC finds the same bits only with the same: the tool's nearest is this.
+/// Most beams of a revolution; further ones are refused and counted. An LD06 sends 450 at 10 Hz.
 pub const BEAMS: usize = 456;
 /// The same on a board with 16 KB of RAM: the last 20 of a revolution, 16°, are given up so that the stack fits too.
 pub const SMALL_BEAMS: usize = 430;
@@ -149,6 +148,8 @@ struct Turns<const N: usize> {
     odometry: Odometry<N>,
     /// Where the robot is by its wheels, until a revolution has used it.
     wheels: Option<Pose>,
+    /// The same at the end of the last revolution.
+    last_wheels: Option<Pose>,
     output: Output,
     record: bool,
     scans: bool,
@@ -180,6 +181,7 @@ impl<const N: usize> App<N> {
                 assembler: Assembler::new(),
                 odometry: Odometry::new(config.odometry),
                 wheels: None,
+                last_wheels: None,
                 output: config.output,
                 record: config.record,
                 scans: config.scans,
@@ -383,7 +385,13 @@ impl<const N: usize> Turns<N> {
         }
         let scan = self.assembler.scan();
         let time_us = scan.end_us();
-        let step = self.odometry.update(scan, self.wheels.take());
+        let wheels = self.wheels.take();
+        let ego = EgoMotion {
+            wheels: (self.last_wheels.zip(wheels)).map(|(last, now)| last.between(now)),
+            rotation: None,
+        };
+        self.last_wheels = wheels.filter(|pose| pose.is_finite());
+        let step = self.odometry.update(scan, ego);
         self.report(time_us, &step);
     }
 

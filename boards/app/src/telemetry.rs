@@ -216,7 +216,7 @@ impl Found {
 /// Found and needed, m and rad, a score, a step, a ratio: what the refusal carries, 0 where it carries less.
 fn numbers(refusal: &Refusal) -> [f32; 2] {
     match refusal {
-        Refusal::TooFar { distance, turn } => [*distance, *turn],
+        Refusal::TooFar { distance, rotation } => [*distance, *rotation],
         Refusal::NoMatch(
             MatchError::TooFewBeams { found, needed }
             | MatchError::TooFewLines { found, needed }

@@ -3,7 +3,7 @@
 
 use arbitrary::Arbitrary;
 use beamfix::{
-    geometry::{Pose, Twist},
+    geometry::{EgoMotion, Pose, Twist},
     matching::icp::{self, IcpConfig, Reference, Search},
     odometry::{Odometry, OdometryConfig},
     scan::{Beam, Bearing, Points, PointsConfig, Range, Scan},
@@ -19,6 +19,7 @@ struct Input {
     guess: [f32; 3],
     twist: [f32; 3],
     wheels: [Option<[f32; 3]>; 3],
+    rotations: [Option<f32>; 3],
     global: bool,
     min_inliers: u16,
     coarse_beams: u16,
@@ -90,11 +91,16 @@ fuzz_target!(|input: Input| {
         icp: config,
         ..OdometryConfig::DEFAULT
     });
-    for (scan, wheels) in [&reference, &current, &reference]
+    let scans = [&reference, &current, &reference];
+    for (scan, (wheels, rotation)) in scans
         .into_iter()
-        .zip(input.wheels)
+        .zip(input.wheels.into_iter().zip(input.rotations))
     {
-        let step = odometry.update(scan, wheels.map(pose));
+        let ego = EgoMotion {
+            wheels: wheels.map(pose),
+            rotation,
+        };
+        let step = odometry.update(scan, ego);
         assert!(step.pose.is_finite(), "{step:?}");
     }
 });

@@ -189,13 +189,10 @@ fn localized(args: &Args, log: &Log, size: usize) -> Result<ExitCode> {
 
 fn replay<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
     let robot_from_lidar = args.mount.unwrap_or(log.robot_from_lidar);
-    let config = OdometryConfig {
-        mount: Mount {
-            robot_from_lidar,
-            ..Mount::DEFAULT
-        },
-        ..OdometryConfig::DEFAULT
-    };
+    let config = OdometryConfig::DEFAULT.with_mount(Mount {
+        robot_from_lidar,
+        ..Mount::DEFAULT
+    });
     let mut pipeline = Pipeline::<N>::new(config);
     let mut trajectory = args.trajectory.as_deref().map(output::create).transpose()?;
     let count = args

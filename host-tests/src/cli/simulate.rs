@@ -148,13 +148,10 @@ fn follow<const N: usize>(
             args.seconds
         );
     };
-    let config = OdometryConfig {
-        mount: Mount {
-            robot_from_lidar: settings.mount.into(),
-            ..Mount::DEFAULT
-        },
-        ..OdometryConfig::DEFAULT
-    };
+    let config = OdometryConfig::DEFAULT.with_mount(Mount {
+        robot_from_lidar: settings.mount.into(),
+        ..Mount::DEFAULT
+    });
     let mut pipeline = Pipeline::<N>::new(config);
     let mut mcap = McapFile::create(&args.out.join("run.mcap"), &["estimate", "truth", "wheels"])?;
     let mut trajectory = output::create(&args.out.join("trajectory.txt"))?;

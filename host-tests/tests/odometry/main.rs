@@ -4,5 +4,6 @@
 mod common;
 mod golden;
 mod interrupted;
+mod pipeline;
 mod replay;
 mod simulate;

@@ -19,10 +19,7 @@ fn replay<const N: usize>(log: &Log, wheels: bool) -> (Vec<Placed>, u32) {
         robot_from_lidar: log.robot_from_lidar,
         ..Mount::DEFAULT
     };
-    let mut pipeline = Pipeline::<N>::new(OdometryConfig {
-        mount,
-        ..OdometryConfig::DEFAULT
-    });
+    let mut pipeline = Pipeline::<N>::new(OdometryConfig::DEFAULT.with_mount(mount));
     let track = log.scans.iter().map(|scan| {
         let pose = pipeline
             .step(&scan.beams, scan.wheels.filter(|_| wheels))

@@ -22,13 +22,10 @@ fn run(seed: u64, seconds: f64) -> Drive {
 
 /// The firmware's pipeline, with the lidar where the simulated robot has it.
 fn pipeline() -> Box<Pipeline<456>> {
-    Pipeline::new(OdometryConfig {
-        mount: Mount {
-            robot_from_lidar: Settings::DEFAULT.mount.into(),
-            ..Mount::DEFAULT
-        },
-        ..OdometryConfig::DEFAULT
-    })
+    Pipeline::new(OdometryConfig::DEFAULT.with_mount(Mount {
+        robot_from_lidar: Settings::DEFAULT.mount.into(),
+        ..Mount::DEFAULT
+    }))
 }
 
 /// FNV-1a over bytes.

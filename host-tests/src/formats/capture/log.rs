@@ -4,9 +4,8 @@ use std::path::Path;
 
 use anyhow::{Result, ensure};
 use beamfix::geometry::Pose;
-use beamfix::scan::Beam;
-use beamfix::scan::assembler::TurnStarts;
 use beamfix::scan::decimator::{Decimator, Keep};
+use beamfix::scan::{Assembler, Beam};
 
 use super::super::{Log, Recorded, bytes};
 use crate::decode::{self, Summary};
@@ -29,27 +28,29 @@ pub struct Turn {
     pub wheels: Option<Pose>,
 }
 
-/// Decodes a stream of the sensor called `lidar` into whole turns; the parts of a turn at either end are left out.
+/// Room for the beams of one revolution of any lidar.
+const ROOM: usize = 8192;
+
+/// Decodes a stream of the sensor called `lidar` into whole turns, as a board's assembler does: the parts of a turn at
+/// either end are left out, and interrupted ones.
 pub fn turns(lidar: &str, stream: &[u8]) -> Result<(Vec<Turn>, Summary)> {
     let mut turns = Vec::new();
-    let mut present: Option<Vec<Beam>> = None;
-    let mut starts = TurnStarts::new();
+    let mut assembler = Box::new(Assembler::<ROOM>::new());
+    // The beams since the last turn, with their times to the microsecond.
+    let mut recent: Vec<Beam> = Vec::new();
     let mut count = 0;
     let summary = decode::decode(lidar, stream, &mut |row| {
-        if starts.push(row.beam.bearing, row.turn_starts) {
-            if let Some(beams) = present.take().filter(|beams| !beams.is_empty()) {
-                turns.push(Turn {
-                    beams: thinned(beams),
-                    ends_at: count,
-                    piece: row.piece,
-                    wheels: None,
-                });
-            }
-            present = Some(Vec::new());
+        if assembler.push(row.beam, row.turn_starts) {
+            let first = recent.len().saturating_sub(assembler.scan().len());
+            turns.push(Turn {
+                beams: thinned(recent.split_off(first)),
+                ends_at: count,
+                piece: row.piece,
+                wheels: None,
+            });
+            recent.clear();
         }
-        if let Some(beams) = &mut present {
-            beams.push(row.beam);
-        }
+        recent.push(row.beam);
         count += 1;
     })?;
     let mut wheels = capture::pieces(stream)

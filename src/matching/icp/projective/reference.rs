@@ -43,29 +43,44 @@ impl Line {
     }
 }
 
-/// A scan as lines by direction: the k-th of N lines is what the lidar saw at `k/N` of a turn.
+/// A scan as lines by direction: the k-th of `n` lines is what the lidar saw at `k/n` of a turn.
 ///
-/// 12·N + 4 bytes. N is best the number of beams of a full turn, also for a lidar that sees less than one.
+/// 12·N + 4 bytes. `n`, at most N, is best the number of beams of a full turn, also for a lidar that sees less than one.
 #[derive(Debug, Clone)]
 pub struct Reference<const N: usize> {
     lines: [Line; N],
     count: u16,
+    directions: u16,
 }
 
 impl<const N: usize> Reference<N> {
-    /// No lines.
+    /// No lines; as many directions as there is room for.
     #[must_use]
     pub const fn new() -> Self {
+        Self::with_directions(u16::MAX)
+    }
+
+    /// No lines; `directions` of them, at most N: matches do not depend on N then, only on this.
+    #[must_use]
+    pub const fn with_directions(directions: u16) -> Self {
+        let all = if N > u16::MAX as usize {
+            u16::MAX
+        } else {
+            N as u16
+        };
         Self {
             lines: [Line::NONE; N],
             count: 0,
+            directions: if directions < all { directions } else { all },
         }
     }
 
     /// The line seen in each direction, counter-clockwise from straight ahead.
     #[must_use]
-    pub const fn lines(&self) -> &[Line] {
-        &self.lines
+    pub fn lines(&self) -> &[Line] {
+        self.lines
+            .get(..usize::from(self.directions))
+            .unwrap_or(&self.lines)
     }
 
     /// Number of points that a line could be laid through.
@@ -84,7 +99,9 @@ impl<const N: usize> Reference<N> {
     ///
     /// The larger part of the preparation that `bench` counts.
     pub fn assign(&mut self, points: &[ScanPoint]) {
-        self.count = normals::lay(&mut self.lines, points);
+        let directions = usize::from(self.directions);
+        let lines = self.lines.get_mut(..directions).unwrap_or_default();
+        self.count = normals::lay(lines, points);
     }
 }
 

@@ -1,0 +1,62 @@
+//! How a robot moved by its own sensors, without looking around.
+
+use super::{Pose, Twist};
+
+/// Motion of the robot from one scan's end to the next one's, as its wheels and its gyroscope measured it.
+///
+/// The default knows nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct EgoMotion {
+    /// Pose of the robot at the second moment in its frame at the first one, by its wheels (m, rad).
+    pub wheels: Option<Pose>,
+    /// Change of heading by its gyroscope, counter-clockwise (rad).
+    pub rotation: Option<f32>,
+}
+
+impl EgoMotion {
+    /// No wheels and no gyroscope told anything.
+    pub const UNKNOWN: Self = Self {
+        wheels: None,
+        rotation: None,
+    };
+
+    /// Motion by the wheels, with the gyroscope's rotation where there is one: on carpet and over sills wheels tell the
+    /// distance well and the heading badly.
+    #[must_use]
+    pub fn motion(self) -> Option<Pose> {
+        let wheels = self.wheels?;
+        let Some(omega) = self.rotation.filter(|rotation| rotation.is_finite()) else {
+            return Some(wheels);
+        };
+        // Along an arc of the same length, bent as the gyroscope says.
+        let arc = Twist::from_motion(wheels, 1.0);
+        Some(Twist { omega, ..arc }.displacement(1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gyroscope_bends_the_wheels_arc_and_leaves_its_length() {
+        let wheels = Some(Pose::new(0.3, 0.0, 0.0));
+        let straight = EgoMotion {
+            wheels,
+            rotation: None,
+        };
+        assert_eq!(straight.motion(), wheels);
+        let quarter = core::f32::consts::FRAC_PI_2;
+        let bent = EgoMotion {
+            wheels,
+            rotation: Some(quarter),
+        };
+        let motion = bent.motion().expect("wheels");
+        // A quarter circle of 0.3 m: its radius is 0.3 · 2/π.
+        let radius = 0.3 / quarter;
+        assert!((motion.x - radius).abs() < 1e-5 && (motion.y - radius).abs() < 1e-5);
+        assert_eq!(motion.theta, quarter);
+        assert_eq!(EgoMotion::UNKNOWN.motion(), None);
+    }
+}
