@@ -10,6 +10,7 @@ mod output;
 mod pairs;
 mod prior;
 mod replay;
+mod scenes;
 mod simulate;
 mod verify;
 mod watch;
@@ -41,6 +42,7 @@ enum Command {
     Learn(learn::Args),
     Bench(bench::Args),
     Card(card::Args),
+    Scenes(scenes::Args),
     Verify(verify::Args),
     Watch(watch::Args),
 }
@@ -59,6 +61,7 @@ pub fn run() -> ExitCode {
         Some(Command::Pairs(args)) => pairs::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Card(args)) => card::run(&args),
+        Some(Command::Scenes(args)) => scenes::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
         Some(Command::Watch(args)) => watch::run(&args),
         Some(Command::Simulate(args)) => simulate::run(&args),

@@ -3,5 +3,6 @@
 pub mod hash;
 pub mod mcap;
 pub mod picture;
+pub mod scene;
 pub mod score;
 pub mod track;

@@ -5,8 +5,11 @@
 //! ```text
 //! scenes ─▶ World ─▶ lidar ─▶ echoes ─▶ encoder ─▶ bytes
 //!                    robot ─▶ truth, wheel odometry
+//! catalogue ─▶ Scene: world, things that move, course, sensor, wheels ─▶ revolutions of beams, wheels, truth
 //! ```
 
+pub mod catalogue;
+pub mod course;
 pub mod drive;
 pub mod encoder;
 pub mod home;
@@ -14,11 +17,18 @@ pub mod lidar;
 pub mod noise;
 pub mod pose;
 pub mod robot;
+pub mod scene;
 pub mod scenes;
+pub mod sensor;
+pub mod spaces;
+pub mod things;
+pub mod wheels;
 pub mod world;
 
+pub use course::Course;
 pub use drive::{Drive, Moment, Settings, drive};
 pub use lidar::{Ranging, Still};
 pub use noise::Noise;
 pub use pose::TruePose;
+pub use scene::{Revolution, Scene};
 pub use world::World;

@@ -68,6 +68,26 @@ impl TruePose {
         }
     }
 
+    /// The share `share` of this motion, along a straight line.
+    #[must_use]
+    pub fn part(self, share: f64) -> Self {
+        Self {
+            x: share * self.x,
+            y: share * self.y,
+            theta: share * self.theta,
+        }
+    }
+
+    /// This pose in a mirror that lies along the x axis.
+    #[must_use]
+    pub fn mirrored(self) -> Self {
+        Self {
+            x: self.x,
+            y: -self.y,
+            theta: -self.theta,
+        }
+    }
+
     /// Distance of the position from the origin (m).
     #[must_use]
     pub fn distance(self) -> f64 {

@@ -98,6 +98,18 @@ impl World {
         }
     }
 
+    /// The same world in a mirror that lies along the x axis.
+    #[must_use]
+    pub fn mirrored(mut self) -> Self {
+        for segment in &mut self.segments {
+            (segment.from[1], segment.to[1]) = (-segment.from[1], -segment.to[1]);
+        }
+        for circle in &mut self.circles {
+            circle.centre[1] = -circle.centre[1];
+        }
+        self
+    }
+
     /// Distance (m) from `from` along the unit vector `towards` to the first face, if there is one.
     #[must_use]
     pub fn cast(&self, from: [f64; 2], towards: [f64; 2]) -> Option<f64> {

@@ -1,0 +1,143 @@
+//! How an odometry does in a simulated scene: how far off, refused, and whether it says so.
+
+use beamfix::{
+    geometry::Pose,
+    odometry::{OdometryConfig, Step},
+    scan::Mount,
+};
+use beamfix_sim::{
+    Revolution, Scene, TruePose,
+    catalogue::{Entry, Must},
+    pose::wrap,
+};
+
+use super::hash::PoseHash;
+use crate::{pipeline::Pipeline, size, sized};
+
+/// A pose farther off than this (m, deg) is wrong ...
+const WRONG: (f64, f64) = (0.05, 1.0);
+/// ... and confident if its squared error, normalised by the covariance, is above this: 3 is ideal.
+const CONFIDENT: f64 = 25.0;
+
+/// What came of one scene with one seed.
+#[derive(Debug, Clone, Default)]
+pub struct Outcome {
+    /// Scans given.
+    pub scans: u32,
+    /// Scans without a match of their own, the first one not counted.
+    pub refused: u32,
+    /// Keyframes given up.
+    pub lost: u32,
+    /// Distance driven (m).
+    pub driven: f64,
+    /// Error at the end: distance (m), and signed heading (deg).
+    pub last: (f64, f64),
+    /// Largest errors of all scans (m, deg).
+    pub largest: (f64, f64),
+    /// Sum of the normalised squared errors of the accepted scans by degree of freedom, and their number.
+    pub squares: (f64, u32),
+    /// Normalised squared error at the end by degree of freedom.
+    pub last_square: f64,
+    /// Accepted scans that are wrong and confident.
+    pub confident: u32,
+    /// Time (s), error (m, deg) of the first of them.
+    pub first_confident: Option<(f64, f64, f64)>,
+    /// Over all poses.
+    pub hash: PoseHash,
+}
+
+impl Outcome {
+    /// Mean normalised squared error of the accepted scans by degree of freedom: 1 is ideal, more is too confident.
+    #[must_use]
+    pub fn nees(&self) -> f64 {
+        self.squares.0 / f64::from(self.squares.1.max(1))
+    }
+
+    /// Whether what the scene asks for came true.
+    #[must_use]
+    pub fn kept(&self, must: Must) -> bool {
+        let within = |(a, b): (f64, f64), (m, d): (f64, f64)| a <= m && b.abs() <= d;
+        self.confident == 0
+            && match must {
+                Must::Follow(metres, degrees) => within(self.last, (metres, degrees)),
+                Must::Hold(metres, degrees) => within(self.largest, (metres, degrees)),
+                Must::Tell => true,
+            }
+    }
+
+    /// Takes a step in: where the robot really is, in the frame in which it started.
+    fn push(&mut self, time: f64, step: &Step, truth: TruePose) {
+        let [x, y, turned] = [
+            f64::from(step.pose.x) - truth.x,
+            f64::from(step.pose.y) - truth.y,
+            wrap(f64::from(step.pose.theta) - truth.theta),
+        ];
+        let (metres, degrees) = (libm::hypot(x, y), turned.to_degrees());
+        self.last = (metres, degrees);
+        self.largest = (
+            self.largest.0.max(metres),
+            self.largest.1.max(degrees.abs()),
+        );
+        let square = step
+            .covariance
+            .information()
+            .map_or(f64::INFINITY, |information| {
+                f64::from(information.0.quadratic([x as f32, y as f32, turned as f32]))
+            });
+        self.last_square = square / 3.0;
+        if step.outcome.is_err() {
+            return;
+        }
+        self.squares.0 += square / 3.0;
+        self.squares.1 += 1;
+        if (metres > WRONG.0 || degrees.abs() > WRONG.1) && square > CONFIDENT {
+            self.confident += 1;
+            self.first_confident.get_or_insert((time, metres, degrees));
+        }
+    }
+}
+
+/// Runs a scene with one seed; `change` changes the default settings.
+pub fn run(
+    entry: &Entry,
+    seed: u64,
+    change: impl Fn(OdometryConfig) -> OdometryConfig,
+    mut observe: impl FnMut(f64, &Step, TruePose),
+) -> Outcome {
+    let scene = (entry.make)(seed);
+    let scans = scene.run(seed);
+    let config = change(OdometryConfig::DEFAULT.with_mount(Mount {
+        robot_from_lidar: scene.mount.into(),
+        ..Mount::DEFAULT
+    }));
+    let size = size::fitting(scans.iter().map(|scan| &scan.beams[..]));
+    sized!(size, follow(&scene, &scans, config, &mut observe))
+}
+
+/// Follows the robot with room for N beams a revolution.
+fn follow<const N: usize>(
+    scene: &Scene,
+    scans: &[Revolution],
+    config: OdometryConfig,
+    observe: &mut dyn FnMut(f64, &Step, TruePose),
+) -> Outcome {
+    let mut pipeline = Pipeline::<N>::new(config);
+    let mut outcome = Outcome::default();
+    let mut before = scene.course.truth(0.0);
+    let Some(origin) = scans.first().map(|scan| scan.truth) else {
+        return outcome;
+    };
+    for revolution in scans {
+        let step = pipeline.step(&revolution.beams, revolution.wheels.map(Pose::from));
+        let truth = origin.between(revolution.truth);
+        outcome.push(revolution.end, &step, truth);
+        observe(revolution.end, &step, truth);
+        outcome.driven += before.between(revolution.truth).distance();
+        before = revolution.truth;
+    }
+    let counters = pipeline.counters();
+    outcome.hash = pipeline.hash;
+    (outcome.scans, outcome.refused, outcome.lost) =
+        (counters.scans, counters.refused, counters.lost);
+    outcome
+}
