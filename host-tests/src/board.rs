@@ -9,6 +9,7 @@ pub mod fields;
 pub mod firmware;
 pub mod maps;
 pub mod real;
+pub mod real_card;
 pub mod rp2040js;
 pub mod start;
 pub mod stream;

@@ -5,7 +5,6 @@ mod card;
 mod decode;
 mod field;
 mod learn;
-mod localize;
 mod output;
 mod pairs;
 mod prior;

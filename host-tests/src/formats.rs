@@ -7,6 +7,7 @@ pub mod bytes;
 pub mod capture;
 pub mod carmen;
 pub mod clock;
+pub mod field;
 pub mod lscan;
 pub mod pairs;
 pub mod ros;

@@ -7,7 +7,7 @@ use beamfix_app::telemetry::Cost;
 use object::{Object as _, ObjectSection as _, SectionFlags, SectionKind};
 use serde::{Deserialize, Serialize};
 
-use super::{Board, commands::Commands, emulator::Count, real::RealCard, root};
+use super::{Board, commands::Commands, emulator::Count, real_card::RealCard, root};
 use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::ld06::Sensor;
 

@@ -8,7 +8,8 @@ use host_tests::board::{
     BOARDS, Board,
     card::{self, Card},
     drivers, maps,
-    real::{REAL, Real, RealCard},
+    real::{REAL, Real},
+    real_card::RealCard,
 };
 
 use super::output;

@@ -5,11 +5,11 @@ use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use beamfix::grid::occupancy::{self, Cell};
 use beamfix::matching::correlative::pyramid::Pyramid;
-use beamfix::sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile, stored};
-use host_tests::formats::ros_map;
+use beamfix::sensor_model::likelihood_field::{FieldModel, LikelihoodField, stored};
+use host_tests::formats::{field::of_map, ros_map};
 use serde_json::json;
 
 use super::output;
@@ -40,6 +40,12 @@ pub struct Args {
 
 /// Reads, says how large it becomes, writes.
 pub fn run(args: &Args) -> Result<ExitCode> {
+    let ending = args.out.extension().and_then(|ending| ending.to_str());
+    ensure!(
+        !ending.is_some_and(|ending| ["yaml", "yml", "pgm", "rs", "png"].contains(&ending)),
+        "--out {}: the table's own file, neither a map nor what is written beside it, e.g. flat.field",
+        args.out.display()
+    );
     let map = ros_map::read(&args.map)?;
     let shape = *map.shape();
     let bytes = stored::HEADER + shape.len();
@@ -52,10 +58,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     );
     let model = FieldModel::new(1.0 - args.z_rand, args.z_rand, args.z_max, args.sigma)
         .context("--sigma, --z-rand, --z-max")?;
-    let squares = ros_map::squares(&map, occupancy::is_occupied);
-    let profile = Profile::new(&model);
-    let field =
-        LikelihoodField::from_map(&map.as_slice(), &squares, &profile, vec![0; shape.len()])?;
+    let field = of_map(&map, &model)?;
     let header = stored::header(&field.as_slice());
     let mut file = output::create(&args.out)?;
     file.write_all(&header)?;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use beamfix::sensor_model::BeamModel;
 use host_tests::formats;
 use host_tests::formats::ros_map;
@@ -35,7 +35,7 @@ pub struct Args {
     /// Most steps.
     #[arg(long, default_value_t = 60)]
     steps: usize,
-    /// Where to draw the data and the fitted density.
+    /// Where to draw the data and the fitted density, .png or .svg.
     #[arg(
         long,
         value_name = "FILE",
@@ -49,6 +49,7 @@ pub struct Args {
 
 /// Learns and reports.
 pub fn run(args: &Args) -> Result<ExitCode> {
+    picture::Kind::of(&args.picture).context("--picture")?;
     let log = formats::read(&args.log)?;
     let ranges = log
         .scans

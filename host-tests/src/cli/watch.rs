@@ -13,7 +13,7 @@ use beamfix_app::command::Command;
 use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::ld06::Sensor;
 use host_tests::board::{Board, commands::Commands, stream::Stream};
-use host_tests::report::picture;
+use host_tests::report::picture::{self, Kind};
 use host_tests::watch::Watch;
 use serde_json::json;
 
@@ -34,7 +34,7 @@ pub struct Args {
     /// How long the simulated drive takes.
     #[arg(long, default_value_t = 60.0, value_name = "S")]
     seconds: f64,
-    /// The picture.
+    /// The picture, .png or .svg.
     #[arg(long, value_name = "FILE", default_value = "target/beamfix/live.png")]
     out: PathBuf,
     /// Seconds between two pictures.
@@ -65,6 +65,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if !(args.seconds.is_finite() && args.seconds > 0.0) {
         bail!("--seconds {}: not a time", args.seconds);
     }
+    Kind::of(&args.out).context("--out")?;
     let recording = args.record.as_deref().map(output::create).transpose()?;
     let qualities = args.quality.as_deref().map(output::create).transpose()?;
     let mut live = Live {
@@ -224,11 +225,13 @@ impl Live<'_> {
         let from = self.args.board.as_deref().or(self.args.source.as_deref());
         let title = format!("beamfix: live from {}", from.unwrap_or("-"));
         // Whoever looks at it never sees half a picture.
-        let is_svg = self.args.out.extension().is_some_and(|end| end == "svg");
         let next = self
             .args
             .out
-            .with_extension(if is_svg { "next.svg" } else { "next.png" });
+            .with_extension(match Kind::of(&self.args.out)? {
+                Kind::Png => "next.png",
+                Kind::Svg => "next.svg",
+            });
         picture::save(&self.watch.map(&title), &next)?;
         replace(&next, &self.args.out)?;
         self.drawn = Instant::now();

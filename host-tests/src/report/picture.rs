@@ -9,7 +9,7 @@ pub mod pair;
 use std::path::Path;
 use std::sync::Once;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
 use plotters::backend::{BitMapBackend, DrawingBackend};
 use plotters::coord::Shift;
 use plotters::drawing::{DrawingArea, IntoDrawingArea};
@@ -52,12 +52,34 @@ pub trait Drawing {
         B::ErrorType: 'static;
 }
 
-/// Draws into a file: SVG where its name ends so, PNG otherwise.
+/// How a picture is kept, by the ending of its file's name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// `.png`
+    Png,
+    /// `.svg`
+    Svg,
+}
+
+impl Kind {
+    /// Other endings are refused: a map or a log must not be drawn over.
+    pub fn of(path: &Path) -> Result<Self> {
+        let ending = path.extension().and_then(|ending| ending.to_str());
+        match ending.map(str::to_ascii_lowercase).as_deref() {
+            Some("png") => Ok(Self::Png),
+            Some("svg") => Ok(Self::Svg),
+            _ => bail!("{}: a picture's name ends in .png or .svg", path.display()),
+        }
+    }
+}
+
+/// Draws into a file, whose name tells the [`Kind`].
 pub fn save(drawing: &impl Drawing, path: &Path) -> Result<()> {
+    let kind = Kind::of(path)?;
     use_font();
     let name = || path.display().to_string();
     let (width, height) = drawing.size();
-    if path.extension().is_some_and(|ending| ending == "svg") {
+    if kind == Kind::Svg {
         let mut text = String::new();
         fill(
             drawing,

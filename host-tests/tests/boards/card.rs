@@ -4,7 +4,8 @@ use crate::common::figures::Risen;
 use host_tests::board::{
     BOARDS,
     card::{Card, drive_commands, measure},
-    real::{REAL, RealCard},
+    real::REAL,
+    real_card::RealCard,
 };
 
 #[test]

@@ -1,6 +1,6 @@
 //! The README's figures are those that `card` prints.
 
-use host_tests::board::{card::Card, real::RealCard};
+use host_tests::board::{card::Card, real_card::RealCard};
 
 #[test]
 fn the_cost_table_is_that_of_the_golden_cards() {

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::common::tool::{beamfix, folder, text};
+use crate::common::tool::{beamfix, folder, json as json_of, text};
 use beamfix::sensor_model::likelihood_field::stored;
 use beamfix_sim::home;
 use host_tests::formats::ros_map;
@@ -176,6 +176,29 @@ fn the_simulated_flat_is_a_map_to_find_oneself_in() {
     println!("{json}");
     let number = |key: &str| json[key].as_u64().expect("a number");
     assert!(4 * number("tracked") >= 3 * number("scans"), "{json}");
+    // The table that `field` wrote is the same map, and gives the same poses.
+    let localized = |map: &str| {
+        let arguments = [
+            "replay",
+            text(&log),
+            "--mode",
+            "localize",
+            "--map",
+            map,
+            "--json",
+        ];
+        json_of(&beamfix(&arguments))
+    };
+    let from_table = localized(text(&table));
+    assert_eq!(from_table["pose_hash"], json["pose_hash"], "{from_table}");
+    // One that was made with another sigma is matched with that sigma.
+    let wide = folder.join("wide.field");
+    let output = beamfix(&["field", text(&yaml), "--sigma", "0.1", "--out", text(&wide)]);
+    assert!(output.status.success(), "{output:?}");
+    let from_wide = localized(text(&wide));
+    assert_ne!(from_wide["pose_hash"], json["pose_hash"], "{from_wide}");
+    let tracked = from_wide["tracked"].as_u64().expect("a number");
+    assert!(2 * tracked >= number("scans"), "{from_wide}");
     // An address that cannot be written to is told, with status 2.
     let nowhere = folder.join("no/such/folder/flat.yaml");
     let output = beamfix(&[
@@ -188,4 +211,83 @@ fn the_simulated_flat_is_a_map_to_find_oneself_in() {
         text(&nowhere),
     ]);
     assert_eq!(output.status.code(), Some(2), "{output:?}");
+}
+
+#[test]
+fn a_map_goes_in_and_is_never_drawn_over() {
+    let folder = folder("field-maps-go-in");
+    let yaml = folder.join("flat.yaml");
+    let output = beamfix(&[
+        "simulate",
+        "--seconds",
+        "5",
+        "--out",
+        text(&folder),
+        "--ros-map",
+        text(&yaml),
+    ]);
+    assert!(output.status.success(), "{output:?}");
+    let (log, table) = (folder.join("lidar.rec"), folder.join("flat.field"));
+    let output = beamfix(&["field", text(&yaml), "--out", text(&table)]);
+    assert!(output.status.success(), "{output:?}");
+    let damaged = folder.join("damaged.field");
+    let mut bytes = fs::read(&table).expect("written");
+    bytes.truncate(1000);
+    fs::write(&damaged, bytes).expect("written");
+    let drawn = folder.join("drawn.png");
+    let _ = fs::remove_file(&drawn);
+    let kept: Vec<_> = [&yaml, &yaml.with_extension("pgm"), &table]
+        .map(|path| (path.clone(), fs::read(path).expect("written")))
+        .into();
+    //   arguments                                                     words of the refusal
+    for (arguments, word) in [
+        (vec!["--map", text(&yaml)], "--picture"),
+        (vec!["--map", text(&drawn)], "--picture"),
+        (vec!["--picture", text(&yaml)], ".png or .svg"),
+        (vec!["--picture", text(&table)], ".png or .svg"),
+        (vec!["--picture", text(&folder)], ".png or .svg"),
+        (vec!["--mode", "localize"], "--map"),
+        (
+            vec!["--mode", "localize", "--map", text(&damaged)],
+            "not a table of `field`",
+        ),
+        (vec!["--start", "0,0,0"], "--mode localize"),
+    ] {
+        let arguments = [vec!["replay", text(&log)], arguments].concat();
+        let output = beamfix(&arguments);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
+        assert_eq!(stderr.lines().count(), 1, "{arguments:?}: {stderr}");
+        assert!(stderr.contains(word), "{arguments:?}: {stderr}");
+    }
+    let output = beamfix(&["field", text(&yaml), "--out", text(&yaml)]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    for (path, bytes) in kept {
+        assert!(
+            fs::read(&path).is_ok_and(|now| now == bytes),
+            "{}",
+            path.display()
+        );
+    }
+    assert!(!drawn.exists(), "the old meaning of --map draws nothing");
+    // What is drawn is of the kind that its name says.
+    let vector = folder.join("drawn.svg");
+    for (arguments, path, start) in [
+        (vec![], &drawn, b"\x89PNG" as &[u8]),
+        (
+            vec!["--mode", "localize", "--map", text(&yaml)],
+            &vector,
+            b"<svg",
+        ),
+    ] {
+        let arguments = [
+            vec!["replay", text(&log), "--picture", text(path)],
+            arguments,
+        ]
+        .concat();
+        let output = beamfix(&arguments);
+        assert!(output.status.success(), "{arguments:?}: {output:?}");
+        let bytes = fs::read(path).expect("drawn");
+        assert!(bytes.starts_with(start), "{}", path.display());
+    }
 }

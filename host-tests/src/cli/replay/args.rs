@@ -1,0 +1,129 @@
+//! What `replay` takes.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail, ensure};
+use beamfix::geometry::Pose;
+use clap::ValueEnum;
+use host_tests::report::picture;
+
+use crate::cli::prior::Prior;
+
+/// About so many scans are drawn into a picture.
+pub const DRAWN: usize = 400;
+
+/// Run the firmware's pipeline over a recorded log: CARMEN .log, .lscan, ROS 2 MCAP, a capture of
+/// `simulate` (lidar.rec), or a raw serial capture; packed or not.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The log.
+    pub log: PathBuf,
+    /// Take the log as raw bytes of this sensor.
+    #[arg(long, value_name = "MODEL")]
+    pub lidar: Option<String>,
+    /// What runs over the scans.
+    #[arg(long, value_enum, default_value_t = Mode::Odometry)]
+    pub mode: Mode,
+    /// Where the guess for each match comes from: the log's wheel odometry, or the last velocity.
+    #[arg(long, value_enum, default_value_t = Prior::Odometry)]
+    pub prior: Prior,
+    /// The memory configuration. Default: the smallest one with room for the log's scans.
+    #[arg(long, value_enum)]
+    pub tier: Option<Tier>,
+    /// Where to write a line `timestamp x y theta` for every scan.
+    #[arg(long, value_name = "FILE")]
+    pub trajectory: Option<PathBuf>,
+    /// The map to localize in: a ROS map's YAML file, or a table that `field` wrote. Only read, with --mode localize.
+    #[arg(long, value_name = "FILE")]
+    pub map: Option<PathBuf>,
+    /// Draw what was seen and driven into this file, .png or .svg.
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
+    /// The lidar's place on the robot (m, m, deg), where the log does not tell or tells it wrong.
+    #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
+    pub mount: Option<Pose>,
+    /// Where the robot starts in the map (m, m, deg). Default: it finds itself.
+    #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
+    pub start: Option<Pose>,
+    /// Stop after so many scans.
+    #[arg(long, value_name = "N")]
+    pub scans: Option<usize>,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What runs over the scans.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+pub enum Mode {
+    Odometry,
+    /// Refused with a clear line until it is there.
+    #[value(hide = true)]
+    Slam,
+    Localize,
+}
+
+/// Compiled memory configurations, by the RAM of the controller: how many beams a revolution may have.
+#[derive(Clone, Copy, ValueEnum)]
+pub enum Tier {
+    /// 360 beams.
+    #[value(name = "16k")]
+    Small = 360,
+    /// 512 beams.
+    #[value(name = "64k")]
+    Middle = 512,
+    /// 720 beams.
+    #[value(name = "192k")]
+    Large = 720,
+    /// 1024 beams.
+    #[value(name = "512k")]
+    Huge = 1024,
+}
+
+impl Args {
+    /// Refuses what does not go together, before anything is read or written.
+    pub fn check(&self) -> Result<()> {
+        if let Some(path) = &self.picture {
+            picture::Kind::of(path)?;
+        }
+        match (&self.map, self.mode) {
+            (None, Mode::Localize) => {
+                bail!(
+                    "--mode localize needs --map: a ROS map's YAML file, or a table that `field` wrote"
+                )
+            }
+            (Some(path), Mode::Odometry | Mode::Slam) => bail!(
+                "--map {}: the map that goes in, for --mode localize; --picture FILE draws what was seen and driven",
+                path.display()
+            ),
+            _ => {}
+        }
+        ensure!(
+            self.start.is_none() || self.mode == Mode::Localize,
+            "--start: a place in a map, for --mode localize"
+        );
+        Ok(())
+    }
+
+    /// How many of a log's scans are replayed.
+    pub fn count(&self, scans: usize) -> usize {
+        self.scans.map_or(scans, |most| most.min(scans))
+    }
+
+    /// The log's name without its folders.
+    pub fn name(&self) -> String {
+        let name = self.log.file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    }
+}
+
+/// `x,y,degrees`.
+fn pose(text: &str) -> Result<Pose> {
+    let numbers: Vec<f32> = text.split(',').map(str::parse).collect::<Result<_, _>>()?;
+    match numbers[..] {
+        [x, y, degrees] if numbers.iter().all(|v| v.is_finite()) => {
+            Ok(Pose::new(x, y, degrees.to_radians()))
+        }
+        _ => bail!("three numbers wanted: x,y,degrees"),
+    }
+}
