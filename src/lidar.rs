@@ -30,80 +30,23 @@
 //! Which way the angles of LDS02RR and COIN-D4 grow, and where the zero of many sensors looks, no source proves: try it on
 //! the unit, and copy the [`Model`] with `counter_clockwise` and `zero_cdeg` as found.
 
-pub mod camsense;
-pub mod choice;
-pub mod coin_d4;
-pub mod delta;
-pub mod framing;
-pub mod identify;
+mod bringup;
+pub mod model;
+mod sensors;
+mod wire;
+
+pub use bringup::{choice, identify, motor, startup};
+pub use model::{Family, Model};
+pub use sensors::{camsense, coin_d4, delta, ld06, lds01, rplidar, scip, sick, xv11, ydlidar};
+pub use wire::framing::{Framer, Verdict};
 #[cfg(any(
     feature = "embedded-io",
     feature = "embedded-io-async",
     feature = "embedded-hal-nb"
 ))]
-pub mod io;
-pub mod layout;
-pub mod ld06;
-pub mod lds01;
-pub mod model;
-pub mod motor;
-pub mod packet;
-pub mod parser;
-pub mod ring;
-pub mod rplidar;
-pub mod scip;
-pub mod sick;
-pub mod startup;
-pub mod timing;
-pub mod xv11;
-pub mod ydlidar;
-
-pub use framing::{Framer, Verdict};
-pub use layout::Layout;
-pub use model::{Family, Model};
-pub use packet::{Packet, Reading, Sample, View};
-pub use parser::{Format, Parser};
-
-/// A lidar's serial protocol as a push parser.
-///
-/// The bytes may come in pieces of any size: the packets are the same.
-pub trait Protocol {
-    /// One frame that passed every check.
-    type Packet: Packet;
-
-    /// Takes the next byte of the line; gives the packet that it completes.
-    fn push(&mut self, byte: u8) -> Option<Self::Packet>;
-
-    /// Gives a packet that is already complete among the bytes held.
-    ///
-    /// Only needed at the end of a recording: a false start can hold back several true frames, and each
-    /// [`Protocol::push`] gives one of them.
-    fn pull(&mut self) -> Option<Self::Packet>;
-
-    /// Says when (µs) the bytes pushed next came in.
-    ///
-    /// Times of sensors without a clock are counted back from there. Without it they run at the sensor's nominal pace.
-    fn arrived(&mut self, now_us: u32);
-
-    /// Bytes held of a frame that is not complete yet.
-    fn pending_bytes(&self) -> usize;
-
-    /// What has been seen so far.
-    fn counters(&self) -> Counters;
-}
-
-/// What a parser has seen since its start; every number wraps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Counters {
-    /// Frames with measurements that passed every check.
-    pub packets: u32,
-    /// Other good frames: answers to commands, time frames.
-    pub answers: u32,
-    /// Complete frames that failed their check code.
-    pub check_errors: u32,
-    /// Bytes that belong to no accepted frame.
-    pub skipped_bytes: u32,
-    /// Revolutions begun.
-    pub revolutions: u32,
-}
+pub use wire::io;
+pub use wire::layout::Layout;
+pub use wire::packet::{Packet, Reading, Sample, View};
+pub use wire::parser::{Format, Parser};
+pub use wire::protocol::{Counters, Protocol};
+pub use wire::{framing, layout, request, ring, survey, timing};

@@ -17,8 +17,8 @@ fuzz_target!(|input: &[u8]| {
     let model = &Model::ALL[usize::from(choice) % Model::ALL.len()];
     match model.family {
         Family::RplidarScan => framed(rplidar::Parser::for_model(model), bytes),
-        Family::RplidarExpress => framed(rplidar::capsule::Parser::express(model), bytes),
-        Family::RplidarDense => framed(rplidar::capsule::Parser::dense(model), bytes),
+        Family::RplidarExpress => framed(rplidar::capsule::Parser::for_model(model), bytes),
+        Family::RplidarDense => framed(rplidar::capsule::Parser::for_model(model), bytes),
         Family::RplidarUltra => framed(rplidar::ultra::UltraParser::for_model(model), bytes),
         Family::RplidarUltraDense => {
             framed(rplidar::ultra::UltraDenseParser::for_model(model), bytes);

@@ -8,7 +8,7 @@ use beamfix::lidar::{
     ring::Ring,
     rplidar::command::{self, Answers, Health, Info},
     scip::command::{Parameters, Part, Replies},
-    startup::{Action, Dialect, StartConfig, Startup},
+    startup::{Action, StartConfig, Startup},
 };
 use libfuzzer_sys::fuzz_target;
 
@@ -72,7 +72,7 @@ fn replies(bytes: &[u8]) {
 
 /// Time passes and bytes come as the input has it; an end stays one.
 fn startup(model: &Model, bytes: &[u8]) {
-    let mut startup = Startup::new(Dialect::of(model), StartConfig::DEFAULT);
+    let mut startup = Startup::new(model, StartConfig::DEFAULT);
     let mut now_us = 0u32;
     for &byte in bytes {
         match startup.poll(now_us) {

@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 use std::f64::consts::TAU;
 
-use beamfix::lidar::ld06::Parallax;
-use beamfix::lidar::ydlidar::Correction;
+use beamfix::lidar::model::Correction;
+use beamfix::lidar::model::Parallax;
 use beamfix::lidar::{Family, Model, Packet, Protocol};
 use beamfix::scan::{Assembler, Beam};
 use beamfix_sim::encoder::{self, Echo, damage};

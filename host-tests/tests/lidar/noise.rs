@@ -198,10 +198,10 @@ fn no_content_of_a_frame_is_too_much() {
         hammer(ld06::Parser::for_model(&model).format(), &[47], &[]);
     }
     hammer(rplidar::Parser::new().format(), &[5], &[]);
-    let express = rplidar::capsule::Parser::express(&Model::RPLIDAR_EXPRESS);
+    let express = rplidar::capsule::Parser::for_model(&Model::RPLIDAR_EXPRESS);
     hammer(express.format(), &[84], &[]);
     hammer(express.format(), &[84], &[(3, 0x10)]);
-    let dense = rplidar::capsule::Parser::dense(&Model::RPLIDAR_DENSE);
+    let dense = rplidar::capsule::Parser::for_model(&Model::RPLIDAR_DENSE);
     hammer(dense.format(), &[84], &[(3, 0x10)]);
     let ultra = rplidar::ultra::UltraParser::for_model(&Model::RPLIDAR_ULTRA);
     hammer(ultra.format(), &[132], &[(3, 0x10)]);

@@ -7,7 +7,7 @@ use beamfix::lidar::{
     Model, Packet as _, Protocol,
     choice::{WithParser, with_parser},
     identify::identify,
-    startup::{Action, Dialect, StartConfig, Startup},
+    startup::{Action, StartConfig, Startup},
 };
 use qemu_m0::uart;
 
@@ -48,7 +48,7 @@ fn listened() -> &'static Model {
 /// Time passes by the bytes that come.
 #[inline(never)]
 fn start(model: &Model) {
-    let mut startup = Startup::new(Dialect::of(model), StartConfig::DEFAULT);
+    let mut startup = Startup::new(model, StartConfig::DEFAULT);
     let mut now_us = 0u32;
     loop {
         match startup.poll(now_us) {

@@ -1,7 +1,7 @@
 //! 3irobotix Delta frames.
 
 use beamfix::lidar::Model;
-use beamfix::lidar::delta::Sector;
+use beamfix::lidar::model::Sector;
 
 use super::{Shot, Sweep, Wire};
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use beamfix::lidar::ld06::Parallax;
+use beamfix::lidar::model::Parallax;
 use beamfix::lidar::{Family, Model};
 
 use super::{Echo, Encoder};

@@ -1,7 +1,7 @@
 //! Hokuyo SCIP 2.0: the reply to an endless MD command.
 
 use beamfix::lidar::Model;
-use beamfix::lidar::scip::Steps;
+use beamfix::lidar::model::Steps;
 
 use super::{Shot, Sweep, Wire};
 

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use beamfix::lidar::Model;
-use beamfix::lidar::ydlidar::{Correction, Flags, Samples};
+use beamfix::lidar::model::{Correction, Flags, Samples};
 
 use super::{Shot, Wire, q6};
 
