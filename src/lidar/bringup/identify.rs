@@ -230,7 +230,8 @@ pub fn hints(model: &Model, bytes: &[u8]) -> impl Iterator<Item = Hint> {
     let found = identify(bytes);
     hints[0] = only_flow_control_is_missing(bytes).then_some(Hint::FlowControl);
     // Text is a sensor's language, too.
-    let seven = found.is_none() && bytes.len() >= 64 && bytes.iter().all(|byte| *byte < 0x80);
+    let explained = found.is_some_and(|found| is_most(found.survey, bytes));
+    let seven = !explained && bytes.len() >= 64 && bytes.iter().all(|byte| *byte < 0x80);
     hints[1] = seven.then_some(Hint::SevenBits);
     hints[2] = match found {
         None if survey.frames == 0 => Some(Hint::NothingFits),
@@ -242,6 +243,11 @@ pub fn hints(model: &Model, bytes: &[u8]) -> impl Iterator<Item = Hint> {
     let is_damaged = survey.check_errors > 1 && lost_percent >= 1 && hints[2].is_none();
     hints[3] = is_damaged.then_some(Hint::Damaged { lost_percent });
     hints.into_iter().flatten()
+}
+
+/// Whether frames cover more than half of the bytes.
+fn is_most(survey: Survey, bytes: &[u8]) -> bool {
+    u64::from(survey.covered_bytes) * 2 > bytes.len() as u64
 }
 
 /// Whether nearly every value occurs, but neither 0x11 nor 0x13.
