@@ -9,15 +9,35 @@ pub mod carmen;
 pub mod clock;
 pub mod field;
 pub mod lscan;
+pub mod no_return;
+pub mod order;
 pub mod pairs;
 pub mod ros;
 pub mod ros_map;
+mod unknown;
 
 use std::path::Path;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use beamfix::geometry::Pose;
-use beamfix::scan::Beam;
+use beamfix::scan::decimator::{Decimator, Keep};
+use beamfix::scan::{Beam, Mount};
+
+use self::no_return::Odd;
+use self::order::Order;
+
+/// What the user says about a log.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// The log is raw bytes of this sensor.
+    pub lidar: Option<String>,
+    /// In which order the beams of a `LaserScan` were measured. Default: what fits best where the robot turns.
+    pub beams: Option<Order>,
+    /// The laser topic of a ROS bag.
+    pub scan_topic: Option<String>,
+    /// The odometry topic of a ROS bag.
+    pub odom_topic: Option<String>,
+}
 
 /// One scan of a log.
 #[derive(Debug, Clone)]
@@ -35,14 +55,20 @@ pub struct Recorded {
 pub struct Log {
     /// The scans in the order of the file.
     pub scans: Vec<Recorded>,
-    /// Where the lidar sits on the robot, as far as the log tells.
-    pub robot_from_lidar: Pose,
+    /// How the lidar sits on the robot.
+    pub mount: Mount,
+    /// Whether [`Log::mount`] is from the log.
+    pub is_mount_told: bool,
+    /// What the log is and what of it is read, in a few words.
+    pub source: String,
+    /// The lidar's model or topic, where the log names it.
+    pub lidar: Option<String>,
     /// Lines or frames left out because they are broken.
     pub skipped: usize,
     /// The first of these and what is wrong with it.
     pub first_skipped: Option<String>,
-    /// Readings that are negative or not a number: kept as beams without a return.
-    pub bad_readings: usize,
+    /// Readings that are no ranges: kept as beams without a return.
+    pub odd: Odd,
     /// Why the file ends before it should.
     pub cut: Option<String>,
 }
@@ -63,46 +89,110 @@ impl Log {
         if let Some(first) = &self.first_skipped {
             parts.push(format!("{} left out, the first at {first}", self.skipped));
         }
-        if self.bad_readings > 0 {
+        if self.odd.bad > 0 {
             parts.push(format!(
                 "{} readings negative or not a number, taken as no return",
-                self.bad_readings
+                self.odd.bad
+            ));
+        }
+        if self.odd.too_near > 0 {
+            parts.push(format!(
+                "{} readings of minus infinity, taken as too near",
+                self.odd.too_near
             ));
         }
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 }
 
-/// Reads a CARMEN text log, an `.lscan` file, a ROS 2 recording (MCAP) or a capture ([`capture`]),
-/// packed with gzip or not; the content tells which.
+/// Reads a log of any format; its content tells which.
 pub fn read(path: &Path) -> Result<Log> {
+    read_with(path, &Options::default())
+}
+
+/// Reads a CARMEN text log, an `.lscan` file, a ROS 2 bag ([`ros`]) or a capture ([`capture`]), packed or not; the
+/// content tells which, and `options` what it does not tell.
+pub fn read_with(path: &Path, options: &Options) -> Result<Log> {
+    let name = path.display().to_string();
+    if let Some(lidar) = &options.lidar {
+        return capture::log::read(path, lidar);
+    }
+    if path.is_dir() {
+        let log = ros::parse(ros::bag::Bag::of_folder(path)?, options)
+            .map_err(|error| error.context(name.clone()))?;
+        return with_scans(log, &name, || String::new());
+    }
     let content = bytes::load(path)?;
-    let name = path.display();
     if content.bytes.starts_with(capture::MAGIC) {
-        return capture::log::parse(&name.to_string(), content, "auto");
+        return capture::log::parse(&name, content, "auto");
     }
-    let mut log = if content.bytes.starts_with(lscan::MAGIC) {
-        lscan::parse(&content.bytes).map_err(|error| error.context(name.to_string()))?
-    } else if content.bytes.starts_with(ros::MAGIC) {
-        ros::parse(&content.bytes)
+    let start = content.bytes[..content.bytes.len().min(unknown::LOOKED_AT)].to_vec();
+    let lines = content.bytes.split(|&b| b == b'\n').count();
+    let mut cut = content.cut.clone();
+    let log = if content.bytes.starts_with(lscan::MAGIC) {
+        lscan::parse(&content.bytes)
+    } else if ros::bag::is_bag(&content.bytes) {
+        let bag = ros::bag::Bag::of_file(content);
+        cut = None;
+        match &bag.attachment {
+            Some(bytes) if bag.topics.is_empty() => {
+                let content = bytes::Content {
+                    bytes: bytes.clone(),
+                    cut: bag.cut,
+                };
+                return capture::log::parse(&name, content, "auto");
+            }
+            _ => ros::parse(bag, options),
+        }
     } else {
-        carmen::parse(&content.bytes)
+        Ok(carmen::parse(&content.bytes))
     };
+    let mut log = log.map_err(|error| error.context(name.clone()))?;
     if log.cut.is_none() {
-        log.cut = content.cut;
+        log.cut = cut;
     }
+    with_scans(log, &name, || unknown::what_it_is(&name, &start, lines))
+}
+
+/// The log if it has a scan, else why not; `what_it_is` says what the file may be instead.
+fn with_scans(log: Log, name: &str, what_it_is: impl Fn() -> String) -> Result<Log> {
     if log.scans.is_empty() {
-        let lines = content.bytes.split(|&b| b == b'\n').count();
         match (&log.first_skipped, &log.cut) {
             (Some(first), _) => bail!(
-                "{name}: no usable scan in {lines} lines; {} broken, the first at {first}",
+                "{name}: no usable scan; {} broken, the first at {first}",
                 log.skipped
             ),
             (None, Some(cut)) => bail!("{name}: no usable scan: {cut}"),
-            (None, None) => bail!(
-                "{name}: no usable scan: no FLASER or ROBOTLASER1 line in {lines} lines, and neither an .lscan nor an MCAP file"
-            ),
+            (None, None) => bail!("{name}: no usable scan: {}", what_it_is()),
         }
     }
+    let beams: usize = log.scans.iter().map(|scan| scan.beams.len()).sum();
+    ensure!(
+        beams > 0,
+        "{name}: {} scans without a beam",
+        log.scans.len()
+    );
     Ok(log)
+}
+
+/// At most `most` beams: of more, one for each of so many directions.
+#[must_use]
+pub fn thinned(beams: Vec<Beam>, most: usize) -> Vec<Beam> {
+    if beams.len() <= most {
+        return beams;
+    }
+    let mut decimator = Decimator::new(most as u16, Keep::First);
+    let mut kept: Vec<Beam> = beams
+        .iter()
+        .filter_map(|beam| decimator.push(*beam, false))
+        .map(|(beam, _)| beam)
+        .collect();
+    // The last direction waits for the next beam.
+    kept.extend(
+        decimator
+            .push(Beam { ..beams[0] }, true)
+            .map(|(beam, _)| beam),
+    );
+    kept.truncate(most);
+    kept
 }

@@ -83,7 +83,7 @@ fn lidar_poses(log: &Log) -> impl Iterator<Item = (usize, Pose)> + '_ {
     poses.filter_map(|(k, scan)| {
         Some((
             k,
-            scan.wheels.filter(|pose| pose.is_finite())? * log.robot_from_lidar,
+            scan.wheels.filter(|pose| pose.is_finite())? * log.mount.robot_from_lidar,
         ))
     })
 }

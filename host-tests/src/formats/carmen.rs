@@ -1,6 +1,7 @@
-//! CARMEN text logs: `FLASER`, `ROBOTLASER1` and `ODOM` lines; other words are skipped.
+//! CARMEN text logs: `FLASER`, `ROBOTLASER1`, `ODOM` and `PARAM` lines; other words are skipped.
 //!
 //! ```text
+//! PARAM name value  ipc_host ipc_time
 //! FLASER n r1..rn  x y theta  odom_x odom_y odom_theta  ipc_time host logger_time
 //! ROBOTLASER1 type start fov resolution max_range accuracy remission n r1..rn m rem1..remm
 //!             laser_x laser_y laser_theta  robot_x robot_y robot_theta  tv rv safety safety axis  ipc_time host time
@@ -8,16 +9,11 @@
 //! ```
 
 use anyhow::{Context, Result, ensure};
-use beamfix::geometry::Pose;
-use beamfix::scan::{Beam, Bearing, NoReturn, Range};
+use beamfix::scan::{Beam, Bearing, Mount};
 
+use super::no_return::{Limits, Rule};
 use super::{Log, Recorded, clock::Clock};
 use beamfix_sim::TruePose;
-
-/// From here on the largest reading of a log stands for "no return": 50.0, 51.2, 81.83, 81.91 are in use.
-const NO_RETURN_FROM: f32 = 49.0;
-/// How far below the largest a reading still means the same.
-const JUST_BELOW: f32 = 0.1;
 
 /// A laser line as it stands.
 struct Line<'a> {
@@ -25,8 +21,7 @@ struct Line<'a> {
     /// First bearing and step (rad).
     first: f64,
     step: f64,
-    /// Readings from here on (m) are no returns.
-    max_range: f32,
+    limits: Limits,
     readings: Vec<f32>,
     laser: TruePose,
     robot: TruePose,
@@ -38,13 +33,23 @@ pub fn parse(text: &[u8]) -> Log {
     let mut log = Log::default();
     let mut lines = Vec::new();
     let mut wheels = None;
+    let mut parameters = Parameters::default();
     for (number, line) in text.split(|&b| b == b'\n').enumerate() {
         let word_end = line
             .iter()
             .position(|b| b.is_ascii_whitespace())
             .unwrap_or(line.len());
         let parsed = match &line[..word_end] {
-            b"FLASER" => words(line).and_then(|w| flaser(&w)),
+            b"PARAM" => {
+                let words: Vec<_> = words(line).unwrap_or_default();
+                parameters.take(words.get(1).copied(), words.get(2).copied());
+                continue;
+            }
+            b"NEFF" => {
+                parameters.is_corrected = true;
+                continue;
+            }
+            b"FLASER" => words(line).and_then(|w| flaser(&w, &parameters)),
             b"ROBOTLASER1" => words(line).and_then(|w| robotlaser(&w)),
             b"ODOM" => match words(line).and_then(|w| pose(&w, 1)) {
                 Ok(pose) => {
@@ -75,26 +80,17 @@ pub fn parse(text: &[u8]) -> Log {
             Err(error) => log.skip(format!("line {}", number + 1), format!("{error:#}")),
         }
     }
-    let largest = lines
-        .iter()
-        .flat_map(|line| line.readings.iter().copied())
-        .filter(|reading| reading.is_finite())
-        .fold(0.0f32, |a, b| if b > a { b } else { a });
-    let no_return = if largest >= NO_RETURN_FROM {
-        largest - JUST_BELOW
-    } else {
-        f32::INFINITY
+    let rule = Rule::of(lines.iter().map(|line| (&line.readings[..], line.limits)));
+    (log.mount, log.is_mount_told) = mount(&lines, &parameters);
+    log.source = match rule.plateau() {
+        Some(metres) => format!("CARMEN log, no return from {metres:.2} m on"),
+        None => "CARMEN log".into(),
     };
-    log.robot_from_lidar = mount(&lines);
     let mut clock = Clock::new();
     for line in lines {
         let time_us = clock.at(line.stamp.parse().unwrap_or(f64::NAN));
-        log.bad_readings += line
-            .readings
-            .iter()
-            .filter(|r| r.is_nan() || **r < 0.0)
-            .count();
-        let beams = line.beams(no_return, time_us);
+        log.odd.count(&line.readings);
+        let beams = line.beams(rule, time_us);
         log.scans.push(Recorded {
             stamp: line.stamp.to_owned(),
             wheels: Some(line.robot.into()),
@@ -105,17 +101,12 @@ pub fn parse(text: &[u8]) -> Log {
 }
 
 impl Line<'_> {
-    fn beams(&self, no_return: f32, time_us: u32) -> Vec<Beam> {
+    fn beams(&self, rule: Rule, time_us: u32) -> Vec<Beam> {
         let beam = |(k, &reading): (usize, &f32)| {
             let bearing = self.first + self.step * k as f64;
-            let range = if reading >= no_return || reading >= self.max_range {
-                Range::none(NoReturn::TooFar)
-            } else {
-                Range::from_metres(reading)
-            };
             Beam {
                 bearing: Bearing::from_radians(bearing as f32),
-                range,
+                range: rule.range(reading, self.limits),
                 time_us,
                 quality: 0,
             }
@@ -124,19 +115,83 @@ impl Line<'_> {
     }
 }
 
-fn flaser<'a>(words: &[&'a str]) -> Result<Line<'a>> {
+/// What the `PARAM` lines say about the laser in front. A `ROBOTLASER1` line says more itself.
+#[derive(Debug, Clone, Copy, Default)]
+struct Parameters {
+    /// Field of view (rad).
+    field: Option<f64>,
+    /// Step between two beams (rad).
+    step: Option<f64>,
+    /// Longest range (m).
+    max_range: Option<f64>,
+    offset: TruePose,
+    is_flipped: bool,
+    /// The log is a mapper's (GMapping writes a `NEFF` line after each scan): its poses are the laser's.
+    is_corrected: bool,
+}
+
+impl Parameters {
+    fn take(&mut self, name: Option<&str>, value: Option<&str>) {
+        let (Some(name), Some(value)) = (name, value) else {
+            return;
+        };
+        let number = value.parse().ok().filter(|value: &f64| value.is_finite());
+        let positive = number.filter(|value| *value > 0.0);
+        match name {
+            // Radians; a full turn has 6.28 of them, so more are degrees.
+            "laser_front_laser_fov" => {
+                self.field = positive.map(|fov| if fov > 6.3 { fov.to_radians() } else { fov });
+            }
+            // Degrees; no laser has steps of less than 0.05 of them, so less are radians.
+            "laser_front_laser_resolution" => {
+                self.step = positive.map(|step| if step < 0.05 { step } else { step.to_radians() });
+            }
+            "robot_front_laser_max" => self.max_range = positive,
+            "robot_frontlaser_offset" => self.offset.x = number.unwrap_or(0.0),
+            "robot_frontlaser_side_offset" => self.offset.y = number.unwrap_or(0.0),
+            "robot_frontlaser_angular_offset" => self.offset.theta = number.unwrap_or(0.0),
+            "laser_front_laser_flipped" => self.is_flipped = number.is_some_and(|n| n != 0.0),
+            _ => {}
+        }
+    }
+
+    /// First bearing and step (rad) of `count` readings around straight ahead.
+    ///
+    /// 181 readings over 180° stand at both ends, 180 leave the last end out: the stated step tells which, else that
+    /// the field of view is an even number of steps. Default: 180°.
+    fn directions(&self, count: usize) -> (f64, f64) {
+        let even = (count / 2 * 2) as f64;
+        let field = match (self.field, self.step) {
+            (Some(field), _) => field,
+            (None, Some(step)) => step * even,
+            (None, None) => core::f64::consts::PI,
+        };
+        let both = [field / (count - 1) as f64, field / count as f64];
+        let off = |step: f64, stated: f64| libm::fabs(step - stated) / stated;
+        let step = match self.step {
+            Some(stated) if off(both[0], stated) < 0.001 => both[0],
+            Some(stated) if off(both[1], stated) < 0.001 => both[1],
+            _ => field / even,
+        };
+        (-0.5 * field, step)
+    }
+}
+
+fn flaser<'a>(words: &[&'a str], parameters: &Parameters) -> Result<Line<'a>> {
     let count = count(words, 1)?;
     let readings = readings(words, 2, count)?;
     let rest = 2 + count;
     at_most(words, rest + 9)?;
     ensure!(count >= 2, "{count} readings");
-    // 180 or 181 readings are 1° apart, 360 or 361 half a degree: 180° over the next lower even number.
-    let step = core::f64::consts::PI / (count / 2 * 2) as f64;
+    let (first, step) = parameters.directions(count);
     Ok(Line {
         stamp: stamp(words, rest + 6)?,
-        first: -core::f64::consts::FRAC_PI_2,
+        first,
         step,
-        max_range: f32::INFINITY,
+        limits: Limits::stated(
+            0.0,
+            parameters.max_range.map_or(f32::INFINITY, |m| m as f32),
+        ),
         readings,
         laser: pose(words, rest)?,
         robot: pose(words, rest + 3)?,
@@ -159,31 +214,35 @@ fn robotlaser<'a>(words: &[&'a str]) -> Result<Line<'a>> {
         stamp: stamp(words, rest + 11)?,
         first,
         step,
-        max_range: if max_range > 0.0 {
-            max_range
-        } else {
-            f32::INFINITY
-        },
+        limits: Limits::stated(0.0, max_range),
         readings,
         laser: pose(words, rest)?,
         robot: pose(words, rest + 3)?,
     })
 }
 
-/// Where the laser sits on the robot, if the lines agree; corrected logs have poses of two origins there.
-fn mount(lines: &[Line]) -> Pose {
-    let Some(first) = lines.first().map(|line| line.robot.between(line.laser)) else {
-        return Pose::IDENTITY;
-    };
-    let agrees = lines.iter().all(|line| {
-        let off = first.between(line.robot.between(line.laser));
-        off.distance() < 0.01 && off.theta.abs() < 0.01
+/// Where the laser sits on the robot: by the lines, if they agree (corrected logs have poses of two origins there); by
+/// the parameters, if no line tells the laser's pose from the robot's and no mapper wrote them.
+fn mount(lines: &[Line], parameters: &Parameters) -> (Mount, bool) {
+    let told = lines.first().map_or(TruePose::default(), |first| {
+        let first = first.robot.between(first.laser);
+        let agrees = lines.iter().all(|line| {
+            let off = first.between(line.robot.between(line.laser));
+            off.distance() < 0.01 && off.theta.abs() < 0.01
+        });
+        if agrees && first.distance() < 2.0 {
+            first
+        } else {
+            TruePose::default()
+        }
     });
-    if agrees && first.distance() < 2.0 {
-        first.into()
-    } else {
-        Pose::IDENTITY
-    }
+    let is_told = parameters.is_corrected || lines.iter().any(|line| line.laser != line.robot);
+    let place = if is_told { told } else { parameters.offset };
+    let mount = Mount {
+        robot_from_lidar: place.into(),
+        upside_down: parameters.is_flipped,
+    };
+    (mount, place != TruePose::default() || parameters.is_flipped)
 }
 
 fn words(line: &[u8]) -> Result<Vec<&str>> {
@@ -284,14 +343,14 @@ mod tests {
         };
         assert_eq!(mm(0), [Some(1000), Some(2500), None, None]);
         assert_eq!(mm(1), [Some(1000), None, None]);
-        assert_eq!(log.bad_readings, 1);
+        assert_eq!(log.odd.bad, 1);
         let degrees: Vec<f32> = log.scans[0]
             .beams
             .iter()
             .map(|b| b.bearing.radians().to_degrees())
             .collect();
         assert!((degrees[0] + 90.0).abs() < 0.01 && (degrees[1] + 45.0).abs() < 0.01);
-        let mount = log.robot_from_lidar;
+        let mount = log.mount.robot_from_lidar;
         assert!(
             (mount.x - 0.1 * 0.877_583).abs() < 1e-5 && (mount.y + 0.1 * 0.479_426).abs() < 1e-5
         );
@@ -299,11 +358,60 @@ mod tests {
     }
 
     #[test]
+    fn parameters_tell_directions_and_mount() {
+        let degrees = |readings: usize, parameters: &str| -> (f32, f32) {
+            let readings = format!("FLASER {readings}{}", " 1.5".repeat(readings));
+            let log = parse(format!("{parameters}{readings} 1 2 0 1 2 0 3 h 3\n").as_bytes());
+            let beams = &log.scans.first().expect("a scan").beams;
+            let end = |beam: Option<&Beam>| beam.map_or(0.0, |b| b.bearing.radians().to_degrees());
+            (end(beams.first()), end(beams.last()))
+        };
+        let fov = "PARAM laser_front_laser_fov";
+        let step = "PARAM laser_front_laser_resolution";
+        //   readings  parameters                                    first and last bearing
+        for (readings, parameters, expected) in [
+            (181, String::new(), (-90.0, 90.0)),
+            (180, String::new(), (-90.0, 89.0)),
+            (541, format!("{fov} 4.71239 h 0\n"), (-135.0, 135.0)),
+            (
+                541,
+                format!("{fov} 270 h 0\n{step} 0.50 h 0\n"),
+                (-135.0, 135.0),
+            ),
+            (541, format!("{step} 0.5 h 0\n"), (-135.0, 135.0)),
+            // A step that the number of readings contradicts.
+            (
+                181,
+                format!("{fov} 3.14159265 h 0\n{step} 0.5 h 0\n"),
+                (-90.0, 90.0),
+            ),
+            (
+                360,
+                format!("{fov} 3.14159265 h 0\n{step} 0.5 h 0\n"),
+                (-90.0, 89.5),
+            ),
+            (271, format!("{fov} nan h 0\n{step}\n"), (-90.0, 90.0)),
+        ] {
+            let found = degrees(readings, &parameters);
+            let off = [found.0 - expected.0, found.1 - expected.1];
+            assert!(
+                off.iter().all(|off| off.abs() < 0.02),
+                "{readings} {parameters}: {found:?}"
+            );
+        }
+        let offsets =
+            "PARAM robot_frontlaser_offset -0.04 h 0\nPARAM laser_front_laser_flipped 1 h 0\n";
+        let line = "FLASER 2 1 1 1 2 0 1 2 0 3 h 3\n";
+        let mount = parse(format!("{offsets}{line}").as_bytes()).mount;
+        assert!(mount.upside_down && mount.robot_from_lidar.x == -0.04);
+    }
+
+    #[test]
     fn broken_lines_are_counted_and_the_first_is_named() {
         let text = b"FLASER 3 1 2 x 0 0 0 0 0 0 1 h 1\nFLASER 3 1 2\nFLASER\nODOM 1\n\
             FLASER 2 nan -1 0 0 0 0 0 0 1.0 h 1\nFLASER 2 1 1 0 0 0 nan 0 0 1.0 h 1\n";
         let log = parse(text);
-        assert_eq!((log.scans.len(), log.skipped, log.bad_readings), (1, 5, 2));
+        assert_eq!((log.scans.len(), log.skipped, log.odd.bad), (1, 5, 2));
         let first = log.first_skipped.expect("one");
         assert!(
             first.starts_with("line 1: reading 2: \"x\" is not a number"),

@@ -5,8 +5,9 @@
 //! ranges (`u16` units, 0 for nothing).
 
 use anyhow::{Result, bail, ensure};
-use beamfix::scan::{Beam, Bearing, NoReturn, Range};
+use beamfix::scan::{Beam, Bearing};
 
+use super::no_return::{Limits, Rule};
 use super::{Log, Recorded, clock::Clock};
 use beamfix_sim::TruePose;
 
@@ -35,9 +36,26 @@ pub fn parse(bytes: &[u8]) -> Result<Log> {
     );
     ensure!((1..=65_536).contains(&beams), "{beams} beams a scan");
     let size = SCAN_HEADER + 2 * beams;
-    let mut log = Log::default();
+    let limits = Limits::stated(0.0, longest as f32);
+    let readings = |scan: &[u8]| -> Vec<f32> {
+        let units = scan[SCAN_HEADER..].chunks_exact(2);
+        units
+            .map(|pair| (f64::from(u16::from_le_bytes([pair[0], pair[1]])) * unit) as f32)
+            .collect()
+    };
+    let all: Vec<Vec<f32>> = bytes[HEADER..]
+        .chunks_exact(size)
+        .take(scans)
+        .map(readings)
+        .collect();
+    let rule = Rule::of(all.iter().map(|readings| (&readings[..], limits)));
+    let mut log = Log {
+        source: ".lscan file".into(),
+        ..Log::default()
+    };
     let mut clock = Clock::new();
-    for (k, scan) in bytes[HEADER..].chunks_exact(size).take(scans).enumerate() {
+    let whole = bytes[HEADER..].chunks_exact(size).take(scans);
+    for (k, (scan, readings)) in whole.zip(&all).enumerate() {
         let time_us = u64_at(scan, 0) as i64;
         let odometry = TruePose::new(f64_at(scan, 8), f64_at(scan, 16), f64_at(scan, 24));
         let first = f64_at(scan, 32);
@@ -49,27 +67,16 @@ pub fn parse(bytes: &[u8]) -> Result<Log> {
             continue;
         }
         let driver_us = clock.at(time_us as f64 * 1e-6);
-        let beam = |(k, pair): (usize, &[u8])| {
-            let metres = f64::from(u16::from_le_bytes([pair[0], pair[1]])) * unit;
-            Beam {
-                bearing: Bearing::from_radians((first + step * k as f64) as f32),
-                range: if metres >= longest {
-                    Range::none(NoReturn::TooFar)
-                } else {
-                    Range::from_metres(metres as f32)
-                },
-                time_us: driver_us,
-                quality: 0,
-            }
+        let beam = |(k, &reading): (usize, &f32)| Beam {
+            bearing: Bearing::from_radians((first + step * k as f64) as f32),
+            range: rule.range(reading, limits),
+            time_us: driver_us,
+            quality: 0,
         };
         log.scans.push(Recorded {
             stamp: seconds(time_us),
             wheels: Some(odometry.into()),
-            beams: scan[SCAN_HEADER..]
-                .chunks_exact(2)
-                .enumerate()
-                .map(beam)
-                .collect(),
+            beams: readings.iter().enumerate().map(beam).collect(),
         });
     }
     let whole = (bytes.len() - HEADER) / size;

@@ -10,9 +10,10 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 use beamfix::geometry::Pose;
-use beamfix::scan::{Beam, Bearing, Range};
+use beamfix::scan::{Beam, Bearing};
 
 use super::bytes;
+use super::no_return::{Limits, Rule};
 
 /// One pair of a list.
 #[derive(Debug, Clone)]
@@ -46,23 +47,21 @@ pub struct Pairs {
 struct Layout {
     first: f64,
     step: f64,
-    nearest: f32,
-    farthest: f32,
+    limits: Limits,
 }
 
 impl Layout {
-    fn beams(&self, ranges: impl Iterator<Item = f32>) -> Vec<Beam> {
-        let beam = |(k, range): (usize, f32)| Beam {
+    /// The beams of all scans.
+    fn scans(&self, scans: &[Vec<f32>]) -> Vec<Vec<Beam>> {
+        let rule = Rule::of(scans.iter().map(|readings| (&readings[..], self.limits)));
+        let beam = |(k, &reading): (usize, &f32)| Beam {
             bearing: Bearing::from_radians((self.first + self.step * k as f64) as f32),
-            range: Range::from_metres(if range > self.nearest && range < self.farthest {
-                range
-            } else {
-                0.0
-            }),
+            range: rule.range(reading, self.limits),
             time_us: 0,
             quality: 0,
         };
-        ranges.enumerate().map(beam).collect()
+        let beams = |readings: &Vec<f32>| readings.iter().enumerate().map(beam).collect();
+        scans.iter().map(beams).collect()
     }
 }
 
@@ -108,22 +107,23 @@ fn parse_scans(text: &str, list: &mut Pairs) -> Result<HashMap<i64, usize>> {
     let layout = Layout {
         first,
         step,
-        nearest: nearest as f32,
-        farthest: farthest as f32,
+        limits: Limits::stated(nearest as f32, farthest as f32),
     };
+    let mut scans = Vec::new();
     let mut by_index = HashMap::new();
     for (number, line) in lines.enumerate() {
         match parse_scan(line, rays as usize) {
             Ok((index, ranges)) => {
-                by_index.insert(index, list.scans.len());
-                list.scans.push(layout.beams(ranges.into_iter()));
+                by_index.insert(index, scans.len());
+                scans.push(ranges);
             }
             Err(error) => list
                 .skipped
                 .push(format!("scan line {}: {error:#}", number + 2)),
         }
     }
-    ensure!(!list.scans.is_empty(), "no usable scan");
+    ensure!(!scans.is_empty(), "no usable scan");
+    list.scans = layout.scans(&scans);
     Ok(by_index)
 }
 
@@ -236,16 +236,15 @@ fn parse_binary(bytes: &[u8]) -> Result<Pairs> {
     let layout = Layout {
         first: f64::from(first),
         step: f64::from(step),
-        nearest: 0.0,
-        farthest,
+        limits: Limits::stated(0.0, farthest),
     };
     let mut list = Pairs::default();
+    let mut scans: Vec<Vec<f32>> = Vec::new();
     for k in 0..pairs {
         let mut pose = || Pose::new(float(), float(), float());
         let (guess, truth) = (pose(), pose());
         for _ in 0..2 {
-            let ranges: Vec<f32> = (0..beams).map(|_| float()).collect();
-            list.scans.push(layout.beams(ranges.into_iter()));
+            scans.push((0..beams).map(|_| float()).collect());
         }
         list.pairs.push(Pair {
             id: k as i64,
@@ -256,6 +255,7 @@ fn parse_binary(bytes: &[u8]) -> Result<Pairs> {
             truth,
         });
     }
+    list.scans = layout.scans(&scans);
     Ok(list)
 }
 

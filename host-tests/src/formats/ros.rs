@@ -1,340 +1,253 @@
-//! ROS 2 recordings: MCAP files with `sensor_msgs/msg/LaserScan` and `nav_msgs/msg/Odometry` in CDR.
+//! ROS recordings: `sensor_msgs/LaserScan` and `nav_msgs/Odometry` of one topic each, and the static transforms.
 //!
-//! The first laser topic of the file is read; odometry is the last message before a scan. Packed chunks (zstd, lz4) are
-//! refused: `mcap compress --compression none` unpacks them.
+//! Read are MCAP files, SQLite bags, and rosbag2's folders, packed or not. Odometry is the last message before a scan.
 
-use anyhow::{Context, Result, ensure};
-use beamfix::scan::{Beam, Bearing, NoReturn, Range};
+pub mod bag;
+mod decoder;
+mod message;
+mod tree;
 
-use super::{Log, Recorded, clock::Clock};
-use beamfix_sim::TruePose;
+use anyhow::{Result, bail};
+use beamfix::scan::{Beam, Bearing};
 
-/// The first bytes of such a file.
-pub const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+use self::bag::{Bag, Topic};
+use self::message::{Kind, Laser, Odometry, Transform};
+use self::tree::Tree;
+use super::no_return::{Limits, Rule};
+use super::order::{self, Order, Timing};
+use super::{Log, Options, Recorded, clock::Clock};
 
-/// Reads the scans of the first laser topic.
-#[must_use]
-pub fn parse(bytes: &[u8]) -> Log {
-    let mut log = Log::default();
+/// Reads the scans of one laser topic.
+pub fn parse(bag: Bag, options: &Options) -> Result<Log> {
+    let mut log = Log {
+        cut: bag.cut.clone(),
+        ..Log::default()
+    };
+    let lasers = Choice::of(&bag, Kind::Laser, "scan", options.scan_topic.as_deref())?;
+    let odometries = Choice::of(&bag, Kind::Odometry, "odom", options.odom_topic.as_deref())?;
+    let Some(taken) = lasers.taken else {
+        if log.cut.is_none() {
+            log.cut = Some(nothing(&bag));
+        }
+        return Ok(log);
+    };
+    let mut tree = Tree::default();
+    let mut wheels: Option<Odometry> = None;
+    let mut base = None;
+    let mut scans: Vec<(Laser, Option<Odometry>)> = Vec::new();
+    for (number, message) in bag.messages.iter().enumerate() {
+        let topic = &bag.topics[message.topic];
+        let (data, layout) = (&message.data[..], topic.layout);
+        let result = match topic.kind {
+            Kind::Static => Transform::read_all(data, layout).map(|all| tree.take(all)),
+            Kind::Odometry if odometries.taken == Some(message.topic) => {
+                Odometry::read(data, layout).map(|odometry| {
+                    base.get_or_insert_with(|| odometry.child.clone());
+                    wheels = Some(odometry);
+                })
+            }
+            Kind::Laser if taken == message.topic => {
+                Laser::read(data, layout).map(|laser| scans.push((laser, wheels.clone())))
+            }
+            _ => Ok(()),
+        };
+        if let Err(error) = result {
+            log.skip(
+                format!("message {number} ({})", topic.name),
+                format!("{error:#}"),
+            );
+        }
+    }
+    let Some((first, _)) = scans.first() else {
+        return Ok(log);
+    };
+    let mut source = format!("ROS bag, scans {}", lasers.said(&bag));
+    source += &match odometries.taken {
+        Some(_) => format!(", wheels {}", odometries.said(&bag)),
+        None => ", no wheels".into(),
+    };
+    let mut scans_of_limits: Vec<Limits> = Vec::new();
+    for (laser, _) in &scans {
+        scans_of_limits.push(Limits::stated(laser.nearest, laser.farthest));
+    }
+    if Limits::is_impossible(first.nearest, first.farthest) {
+        source += &format!(", range_max {} m is not believed", first.farthest);
+    }
+    source += &mounted(&mut log, &tree, base.as_deref(), &first.header.frame);
+    let limits = |k: usize| scans_of_limits[k];
+    let readings = scans.iter().enumerate();
+    let rule = Rule::of(readings.map(|(k, (laser, _))| (&laser.ranges[..], limits(k))));
     let mut clock = Clock::new();
-    let (mut wheels, mut topic) = (None, None);
-    let mut seen = 0;
-    let messages = match mcap::MessageStream::new(bytes) {
-        Ok(messages) => messages,
-        Err(error) => {
-            log.cut = Some(error.to_string());
-            return log;
-        }
+    let times: Vec<u32> = scans
+        .iter()
+        .map(|(laser, _)| clock.at(laser.header.seconds()))
+        .collect();
+    let beams = |k: usize, timing: &Timing| {
+        let mut beams = beams(&scans[k].0, rule, limits(k));
+        timing.apply(&mut beams, times[k]);
+        beams
     };
-    for (number, message) in messages.enumerate() {
-        let message = match message {
-            Ok(message) => message,
-            Err(error) => {
-                log.cut = Some(format!("after {number} messages: {error}"));
-                break;
-            }
+    let (timing, how) = timing(first, options, |candidates| {
+        order::fitting(candidates, scans.len(), log.mount, beams)
+    });
+    source += &how;
+    for (k, (laser, wheels)) in scans.iter().enumerate() {
+        log.odd.count(&laser.ranges);
+        log.scans.push(Recorded {
+            stamp: format!("{}.{:09}", laser.header.sec, laser.header.nanosec),
+            wheels: wheels.as_ref().map(|odometry| odometry.pose.into()),
+            beams: beams(k, &timing),
+        });
+    }
+    log.lidar = Some(bag.topics[taken].name.clone());
+    log.source = source;
+    Ok(log)
+}
+
+/// Why a bag gives no scan.
+fn nothing(bag: &Bag) -> String {
+    let mut names: Vec<&str> = bag.others.iter().map(String::as_str).collect();
+    names.extend(bag.topics.iter().map(|topic| &topic.name[..]));
+    names.sort_unstable();
+    names.dedup();
+    let shown = names.iter().take(10).copied().collect::<Vec<_>>().join(" ");
+    let more = if names.len() > 10 { " …" } else { "" };
+    format!("a ROS bag without a topic of sensor_msgs/msg/LaserScan; topics: {shown}{more}")
+}
+
+/// When the beams were measured, and a remark where that is not what the file says.
+fn timing(
+    first: &Laser,
+    options: &Options,
+    fitting: impl Fn(&[Timing]) -> order::Fit,
+) -> (Timing, String) {
+    let (step, scan_time) = (f64::from(first.time_step), f64::from(first.scan_time));
+    let candidates = Timing::candidates(step, scan_time, first.ranges.len());
+    if let Some(order) = options.beams {
+        let told = candidates
+            .iter()
+            .find(|timing| timing.order == order && !timing.ends_at_stamp);
+        let timing = told.copied().unwrap_or(Timing {
+            order: Order::AtOnce,
+            step: 0.0,
+            ends_at_stamp: false,
+        });
+        let note = if timing.order == order {
+            format!(", beams {order} as told")
+        } else {
+            format!(", beams at once: time_increment {step} s tells no {order}")
         };
-        seen += 1;
-        let channel = &message.channel;
-        let kind = channel
-            .schema
-            .as_ref()
-            .map_or("", |schema| schema.name.as_str());
-        match kind {
-            "nav_msgs/msg/Odometry" => match odometry(&message.data) {
-                Ok(pose) => wheels = Some(pose),
-                Err(error) => log.skip(format!("message {number}"), format!("{error:#}")),
-            },
-            "sensor_msgs/msg/LaserScan"
-                if topic.get_or_insert_with(|| channel.topic.clone()) == &channel.topic =>
-            {
-                match laser(&message.data) {
-                    Ok(scan) => {
-                        log.bad_readings += scan
-                            .ranges
-                            .iter()
-                            .filter(|r| r.is_nan() || **r < 0.0)
-                            .count();
-                        let beams = scan.beams(clock.at(scan.seconds()));
-                        let stamp = format!("{}.{:09}", scan.sec, scan.nanosec);
-                        log.scans.push(Recorded {
-                            stamp,
-                            wheels: wheels.map(TruePose::into),
-                            beams,
-                        });
-                    }
-                    Err(error) => log.skip(format!("message {number}"), format!("{error:#}")),
-                }
-            }
-            _ => {}
-        }
+        return (timing, note);
     }
-    if topic.is_none() && log.cut.is_none() {
-        log.cut = Some(format!(
-            "no sensor_msgs/msg/LaserScan among {seen} messages"
-        ));
-    }
-    log
-}
-
-/// A `LaserScan`.
-struct Laser {
-    sec: u32,
-    nanosec: u32,
-    first: f32,
-    step: f32,
-    /// From one beam to the next (s).
-    time_step: f32,
-    nearest: f32,
-    farthest: f32,
-    ranges: Vec<f32>,
-}
-
-impl Laser {
-    fn seconds(&self) -> f64 {
-        f64::from(self.sec) + f64::from(self.nanosec) * 1e-9
-    }
-
-    /// The stamp is that of the first beam.
-    fn beams(&self, first_us: u32) -> Vec<Beam> {
-        let beam = |(k, &range): (usize, &f32)| {
-            let bearing = f64::from(self.first) + f64::from(self.step) * k as f64;
-            let age_us = f64::from(self.time_step) * 1e6 * k as f64;
-            Beam {
-                bearing: Bearing::from_radians(bearing as f32),
-                range: if range > self.farthest {
-                    Range::none(NoReturn::TooFar)
-                } else if range < self.nearest {
-                    Range::none(NoReturn::TooNear)
-                } else {
-                    Range::from_metres(range)
-                },
-                time_us: first_us.wrapping_add(age_us as u32),
-                quality: 0,
-            }
-        };
-        self.ranges.iter().enumerate().map(beam).collect()
-    }
-}
-
-fn laser(message: &[u8]) -> Result<Laser> {
-    let mut cdr = Cdr::new(message)?;
-    let (sec, nanosec) = (cdr.u32()?, cdr.u32()?);
-    cdr.skip_text()?;
-    let mut number = || cdr.u32().map(f32::from_bits);
-    let (first, _last, step) = (number()?, number()?, number()?);
-    let (time_step, _scan_time, nearest, farthest) = (number()?, number()?, number()?, number()?);
-    ensure!(
-        first.is_finite() && step.is_finite(),
-        "angles from {first} in steps of {step}"
-    );
-    let count = cdr.u32()? as usize;
-    ensure!(count <= 65_536, "{count} ranges");
-    let ranges = (0..count)
-        .map(|_| cdr.u32().map(f32::from_bits))
-        .collect::<Result<_>>()?;
-    // Some drivers leave it 0 or write rubbish: then all beams count as measured at once.
-    let time_step = if (0.0..0.01).contains(&time_step) {
-        time_step
+    let fit = fitting(&candidates);
+    let timing = fit.timing.unwrap_or(candidates[0]);
+    let note = if fit.gain > 0.0 {
+        format!(
+            ", beams {}: so their scans fit best (a match's score is {:.2} higher than by the file's time_increment {step} s)",
+            timing.order, fit.gain
+        )
     } else {
-        0.0
+        format!(", beams {}", timing.order)
     };
-    Ok(Laser {
-        sec,
-        nanosec,
-        first,
-        step,
-        time_step,
-        nearest,
-        farthest,
-        ranges,
-    })
+    (timing, note)
 }
 
-fn odometry(message: &[u8]) -> Result<TruePose> {
-    let mut cdr = Cdr::new(message)?;
-    cdr.u32()?;
-    cdr.u32()?;
-    cdr.skip_text()?;
-    cdr.skip_text()?;
-    let [x, y, _z] = [cdr.f64()?, cdr.f64()?, cdr.f64()?];
-    let [qx, qy, qz, qw] = [cdr.f64()?, cdr.f64()?, cdr.f64()?, cdr.f64()?];
-    let theta = libm::atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz));
-    ensure!(
-        x.is_finite() && y.is_finite() && theta.is_finite(),
-        "the pose is not finite"
-    );
-    Ok(TruePose::new(x, y, theta))
+/// Takes the mount from the static transforms; says where it is from.
+fn mounted(log: &mut Log, tree: &Tree, base: Option<&str>, lidar: &str) -> String {
+    let base = base.map_or_else(|| tree.base(lidar), str::to_owned);
+    if base == lidar {
+        return String::new();
+    }
+    match tree.mount(&base, lidar) {
+        Some((mount, tilt)) => {
+            log.mount = mount;
+            log.is_mount_told = true;
+            let tilt = tilt.to_degrees();
+            let tilted = if tilt > 5.0 {
+                format!(", tilted by {tilt:.0}° (taken as level)")
+            } else {
+                String::new()
+            };
+            format!(", mount of {lidar} on {base} by /tf_static{tilted}")
+        }
+        None => format!(", no static transform from {base} to {lidar}"),
+    }
 }
 
-/// Little-endian CDR: every number lies at a multiple of its size, counted after the first four bytes.
-struct Cdr<'a> {
-    body: &'a [u8],
-    at: usize,
+/// Beams in the order of the array, all at time 0.
+fn beams(laser: &Laser, rule: Rule, limits: Limits) -> Vec<Beam> {
+    let beam = |(k, &reading): (usize, &f32)| {
+        let bearing = f64::from(laser.first) + f64::from(laser.step) * k as f64;
+        Beam {
+            bearing: Bearing::from_radians(bearing as f32),
+            range: rule.range(reading, limits),
+            time_us: 0,
+            quality: 0,
+        }
+    };
+    laser.ranges.iter().enumerate().map(beam).collect()
 }
 
-impl<'a> Cdr<'a> {
-    fn new(message: &'a [u8]) -> Result<Self> {
-        let (kind, body) = message
-            .split_at_checked(4)
-            .context("a message of less than 4 bytes")?;
-        ensure!(
-            kind[..2] == [0, 1],
-            "not little-endian CDR: it begins with {kind:02x?}"
-        );
-        Ok(Self { body, at: 0 })
+/// Which topic of a kind is read.
+struct Choice {
+    taken: Option<usize>,
+    /// Others of the kind that have messages.
+    others: Vec<usize>,
+}
+
+impl Choice {
+    /// The topic called `wanted`; else the one with the usual name; else one that ends in it; else the one with the
+    /// most messages.
+    fn of(bag: &Bag, kind: Kind, usual: &str, wanted: Option<&str>) -> Result<Self> {
+        let topics = bag.topics.iter().enumerate();
+        let mut all: Vec<(usize, &Topic)> = topics
+            .filter(|(_, topic)| topic.kind == kind && topic.count > 0)
+            .collect();
+        let plain = |name: &str| name.trim_start_matches('/').to_owned();
+        if let Some(wanted) = wanted
+            && !all
+                .iter()
+                .any(|(_, topic)| plain(&topic.name) == plain(wanted))
+        {
+            let names: Vec<&str> = all.iter().map(|(_, topic)| &topic.name[..]).collect();
+            bail!(
+                "no topic {wanted} of this kind; there are: {}",
+                if names.is_empty() {
+                    "none".into()
+                } else {
+                    names.join(" ")
+                }
+            );
+        }
+        // Stable: of equals the first in the file.
+        all.sort_by_key(|(_, topic)| {
+            let name = plain(&topic.name);
+            let rank = match wanted {
+                Some(wanted) => usize::from(name != plain(wanted)),
+                None if name == usual => 0,
+                None if name.rsplit('/').next() == Some(usual) => 1,
+                None => 2,
+            };
+            (rank, usize::MAX - topic.count)
+        });
+        let mut numbers = all.into_iter().map(|(number, _)| number);
+        Ok(Self {
+            taken: numbers.next(),
+            others: numbers.collect(),
+        })
     }
 
-    fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
-        let start = self.at.next_multiple_of(N);
-        let bytes = self.body.get(start..start + N);
-        self.at = start + N;
-        bytes
-            .and_then(|bytes| bytes.try_into().ok())
-            .with_context(|| format!("the message ends after {} bytes", self.body.len()))
-    }
-
-    fn u32(&mut self) -> Result<u32> {
-        self.take().map(u32::from_le_bytes)
-    }
-
-    fn f64(&mut self) -> Result<f64> {
-        self.take().map(f64::from_le_bytes)
-    }
-
-    fn skip_text(&mut self) -> Result<()> {
-        let length = self.u32()? as usize;
-        ensure!(
-            length <= self.body.len(),
-            "a text of {length} bytes in a message of {}",
-            self.body.len()
-        );
-        self.at += length;
-        Ok(())
+    /// The name of what is taken, and of what is not.
+    fn said(&self, bag: &Bag) -> String {
+        let name = |&number: &usize| &bag.topics[number].name[..];
+        let mut text = self.taken.as_ref().map_or("none", name).to_owned();
+        if !self.others.is_empty() {
+            let others: Vec<&str> = self.others.iter().map(name).collect();
+            text += &format!(" (not {})", others.join(", "));
+        }
+        text
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::io::Cursor;
-
-    /// CDR being written.
-    #[derive(Default)]
-    struct Out(Vec<u8>);
-
-    impl Out {
-        fn put<const N: usize>(&mut self, bytes: [u8; N]) -> &mut Self {
-            self.0.resize(self.0.len().next_multiple_of(N), 0);
-            self.0.extend(bytes);
-            self
-        }
-
-        fn text(&mut self, text: &str) -> &mut Self {
-            self.put((text.len() as u32 + 1).to_le_bytes());
-            self.0.extend(text.bytes().chain([0]));
-            self
-        }
-
-        fn message(&self) -> Vec<u8> {
-            [&[0, 1, 0, 0], &self.0[..]].concat()
-        }
-    }
-
-    fn laser_message(sec: u32, ranges: &[f32]) -> Vec<u8> {
-        let mut out = Out::default();
-        out.put(sec.to_le_bytes())
-            .put(5u32.to_le_bytes())
-            .text("laser");
-        for value in [-1.5f32, 1.5, 0.5, 0.001, 0.1, 0.1, 8.0] {
-            out.put(value.to_le_bytes());
-        }
-        out.put((ranges.len() as u32).to_le_bytes());
-        for range in ranges {
-            out.put(range.to_le_bytes());
-        }
-        out.message()
-    }
-
-    fn odometry_message(x: f64, theta: f64) -> Vec<u8> {
-        let mut out = Out::default();
-        out.put(1u32.to_le_bytes())
-            .put(0u32.to_le_bytes())
-            .text("odom")
-            .text("base");
-        for value in [
-            x,
-            2.0,
-            0.0,
-            0.0,
-            0.0,
-            (0.5 * theta).sin(),
-            (0.5 * theta).cos(),
-        ] {
-            out.put(value.to_le_bytes());
-        }
-        out.message()
-    }
-
-    fn file(messages: &[(&str, &str, Vec<u8>)]) -> Vec<u8> {
-        let options = mcap::WriteOptions::new().compression(None);
-        let mut writer = options.create(Cursor::new(Vec::new())).expect("memory");
-        for (sequence, (topic, kind, data)) in messages.iter().enumerate() {
-            let schema = writer.add_schema(kind, "ros2msg", b"").expect("memory");
-            let channel_id = writer
-                .add_channel(schema, topic, "cdr", &Default::default())
-                .expect("memory");
-            let header = mcap::records::MessageHeader {
-                channel_id,
-                sequence: sequence as u32,
-                log_time: 0,
-                publish_time: 0,
-            };
-            writer
-                .write_to_known_channel(&header, data)
-                .expect("memory");
-        }
-        writer.finish().expect("memory");
-        writer.into_inner().into_inner()
-    }
-
-    #[test]
-    fn scans_and_odometry_are_read() {
-        let (laser, odom) = ("sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry");
-        let bytes = file(&[
-            (
-                "/scan",
-                laser,
-                laser_message(7, &[1.0, f32::NAN, 9.0, 0.05]),
-            ),
-            ("/odom", odom, odometry_message(1.0, 0.5)),
-            ("/other", laser, laser_message(7, &[3.0])),
-            ("/scan", laser, laser_message(8, &[1.0, 2.0])),
-            ("/scan", laser, laser_message(9, &[1.0])[..58].to_vec()),
-        ]);
-        let log = parse(&bytes);
-        assert_eq!(
-            (log.scans.len(), log.skipped, log.bad_readings, log.cut),
-            (2, 1, 1, None)
-        );
-        let first = &log.scans[0];
-        assert_eq!((first.stamp.as_str(), first.wheels), ("7.000000005", None));
-        let mm: Vec<_> = first.beams.iter().map(|beam| beam.range.mm()).collect();
-        assert_eq!(
-            mm,
-            [
-                Ok(1000),
-                Err(NoReturn::Nothing),
-                Err(NoReturn::TooFar),
-                Err(NoReturn::TooNear)
-            ]
-        );
-        assert_eq!(first.beams[3].time_us - first.beams[0].time_us, 3000);
-        assert_eq!(log.scans[1].beams[0].time_us, 1_000_000);
-        let wheels = log.scans[1].wheels.expect("odometry came before");
-        assert!((wheels.theta - 0.5).abs() < 1e-6 && wheels.x == 1.0 && wheels.y == 2.0);
-        // A cut file gives what came before the cut, or at least says that it is cut.
-        let cut = parse(&bytes[..bytes.len() / 2]);
-        assert!(cut.cut.is_some());
-    }
-}
+mod tests;

@@ -16,7 +16,7 @@ type Placed = (f64, TruePose);
 
 fn replay<const N: usize>(log: &Log, wheels: bool) -> (Vec<Placed>, u32) {
     let mount = Mount {
-        robot_from_lidar: log.robot_from_lidar,
+        robot_from_lidar: log.mount.robot_from_lidar,
         ..Mount::DEFAULT
     };
     let mut pipeline = Pipeline::<N>::new(OdometryConfig::DEFAULT.with_mount(mount));
@@ -145,7 +145,7 @@ fn low_cost_lidars_are_read_with_their_place_on_the_robot() {
             continue;
         };
         let log = formats::read(&path).expect("the log");
-        let mount = log.robot_from_lidar;
+        let mount = log.mount.robot_from_lidar;
         assert_eq!(
             (log.scans.len(), log.scans[0].beams.len(), log.skipped),
             (scans, beams, 0),

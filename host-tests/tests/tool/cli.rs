@@ -229,7 +229,7 @@ fn broken_lines_and_readings_are_counted_and_the_rest_is_used() {
             &result["bad_readings"],
             &result["skipped"]
         ),
-        (&10.into(), &3.into(), &0.into())
+        (&10.into(), &2.into(), &0.into())
     );
 
     let cut = &good[..good.len() - 200];

@@ -4,7 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail, ensure};
 use beamfix::geometry::Pose;
+use beamfix::scan::Mount;
 use clap::ValueEnum;
+use host_tests::formats::order::Order;
+use host_tests::formats::{Log, Options};
 use host_tests::report::picture;
 
 use crate::cli::prior::Prior;
@@ -12,8 +15,8 @@ use crate::cli::prior::Prior;
 /// About so many scans are drawn into a picture.
 pub const DRAWN: usize = 400;
 
-/// Run the firmware's pipeline over a recorded log: CARMEN .log, .lscan, ROS 2 MCAP, a capture of
-/// `simulate` (lidar.rec), or a raw serial capture; packed or not.
+/// Run the firmware's pipeline over a recorded log: CARMEN .log, .lscan, a ROS 2 bag (MCAP, SQLite, or its folder), a
+/// capture of `simulate` (lidar.rec, run.mcap), or a raw serial capture; packed or not.
 #[derive(clap::Args)]
 pub struct Args {
     /// The log.
@@ -21,6 +24,16 @@ pub struct Args {
     /// Take the log as raw bytes of this sensor.
     #[arg(long, value_name = "MODEL")]
     pub lidar: Option<String>,
+    /// The laser topic of a ROS bag. Default: /scan, or the one with the most scans.
+    #[arg(long, value_name = "TOPIC")]
+    pub scan_topic: Option<String>,
+    /// The odometry topic of a ROS bag. Default: /odom, or the one with the most messages.
+    #[arg(long, value_name = "TOPIC")]
+    pub odom_topic: Option<String>,
+    /// In which order the ranges of a ROS scan were measured. Default: the order in which scans fit best where the robot
+    /// turns: many drivers turn the array round and do not say so.
+    #[arg(long, value_enum)]
+    pub beams: Option<Order>,
     /// What runs over the scans.
     #[arg(long, value_enum, default_value_t = Mode::Odometry)]
     pub mode: Mode,
@@ -39,9 +52,10 @@ pub struct Args {
     /// Draw what was seen and driven into this file, .png or .svg.
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
-    /// The lidar's place on the robot (m, m, deg), where the log does not tell or tells it wrong.
-    #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
-    pub mount: Option<Pose>,
+    /// The lidar's place on the robot (m, m, deg), where the log does not tell or tells it wrong; `,down` after it for a
+    /// lidar that hangs head down.
+    #[arg(long, value_name = "X,Y,DEG[,down]", value_parser = mount, allow_hyphen_values = true)]
+    pub mount: Option<Mount>,
     /// Where the robot starts in the map (m, m, deg). Default: it finds itself.
     #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
     pub start: Option<Pose>,
@@ -105,6 +119,21 @@ impl Args {
         Ok(())
     }
 
+    /// What the command line says about the log.
+    pub fn options(&self) -> Options {
+        Options {
+            lidar: self.lidar.clone(),
+            beams: self.beams,
+            scan_topic: self.scan_topic.clone(),
+            odom_topic: self.odom_topic.clone(),
+        }
+    }
+
+    /// How the lidar sits on the robot: as told here, else as the log tells.
+    pub fn mount_of(&self, log: &Log) -> Mount {
+        self.mount.unwrap_or(log.mount)
+    }
+
     /// How many of a log's scans are replayed.
     pub fn count(&self, scans: usize) -> usize {
         self.scans.map_or(scans, |most| most.min(scans))
@@ -115,6 +144,15 @@ impl Args {
         let name = self.log.file_name().unwrap_or_default();
         name.to_string_lossy().into_owned()
     }
+}
+
+/// `x,y,degrees` or `x,y,degrees,down`.
+fn mount(text: &str) -> Result<Mount> {
+    let place = text.strip_suffix(",down");
+    Ok(Mount {
+        robot_from_lidar: pose(place.unwrap_or(text))?,
+        upside_down: place.is_some(),
+    })
 }
 
 /// `x,y,degrees`.

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use beamfix::geometry::{Pose, Twist};
 use beamfix::localization::{Localizer, LocalizerConfig, Verdict};
 use beamfix::matching::correlative::pyramid::Pyramid;
-use beamfix::scan::{Mount, Points, PointsConfig, Scan};
+use beamfix::scan::{Points, PointsConfig, Scan};
 use beamfix_sim::TruePose;
 use host_tests::formats::Log;
 use host_tests::formats::field::FieldFile;
@@ -71,10 +71,7 @@ fn in_map<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
     let mut buffer = vec![0; Pyramid::bytes(field.grid().shape())];
     let pyramid = Pyramid::new(field, &mut buffer)?;
     let mut robot = Box::new(Localizer::<96>::new(pyramid, LocalizerConfig::DEFAULT));
-    let mount = Mount {
-        robot_from_lidar: args.mount.unwrap_or(log.robot_from_lidar),
-        ..Mount::DEFAULT
-    };
+    let mount = args.mount_of(log);
     if let Some(start) = args.start {
         robot.start_at(start * mount.robot_from_lidar);
     }
@@ -107,7 +104,10 @@ fn in_map<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
         points.assign(
             &scan,
             Twist::from_motion(motion, scan.duration()),
-            &PointsConfig::DEFAULT,
+            &PointsConfig {
+                mount,
+                ..PointsConfig::DEFAULT
+            },
         );
         match robot.update(points.as_slice(), motion) {
             Verdict::Tracking(..) => outcome.tracked += 1,

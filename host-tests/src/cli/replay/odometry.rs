@@ -5,7 +5,6 @@ use std::io::Write;
 use anyhow::Result;
 use beamfix::geometry::Pose;
 use beamfix::odometry::{Counters, OdometryConfig};
-use beamfix::scan::Mount;
 use beamfix_sim::TruePose;
 use host_tests::formats::Log;
 use host_tests::pipeline::Pipeline;
@@ -37,7 +36,7 @@ pub fn run(args: &Args, log: &Log, size: usize) -> Result<()> {
     } = outcome.counters;
     let value = json!({
         "scans": scans, "refused": refused, "keyframes": keyframes, "lost": lost, "loops": 0,
-        "beams": size, "refused_beams": outcome.refused_beams, "skipped": log.skipped, "bad_readings": log.bad_readings,
+        "beams": size, "refused_beams": outcome.refused_beams, "skipped": log.skipped, "bad_readings": log.odd.bad,
         "pose_hash": outcome.hash.to_string(),
     });
     let Pose { x, y, theta } = outcome.last;
@@ -58,11 +57,8 @@ pub fn run(args: &Args, log: &Log, size: usize) -> Result<()> {
 }
 
 fn replay<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
-    let robot_from_lidar = args.mount.unwrap_or(log.robot_from_lidar);
-    let config = OdometryConfig::DEFAULT.with_mount(Mount {
-        robot_from_lidar,
-        ..Mount::DEFAULT
-    });
+    let mount = args.mount_of(log);
+    let config = OdometryConfig::DEFAULT.with_mount(mount);
     let mut pipeline = Pipeline::<N>::new(config);
     let mut trajectory = args.trajectory.as_deref().map(output::create).transpose()?;
     let count = args.count(log.scans.len());
@@ -70,7 +66,7 @@ fn replay<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
     let mut last = Pose::IDENTITY;
     let mut track = Track::new(
         TruePose::default(),
-        robot_from_lidar,
+        mount.robot_from_lidar,
         (count / DRAWN).max(1),
     );
     let start = log.scans.first().and_then(|scan| scan.wheels);

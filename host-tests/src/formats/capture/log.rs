@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use beamfix::geometry::Pose;
-use beamfix::scan::decimator::{Decimator, Keep};
-use beamfix::scan::{Assembler, Beam};
+use beamfix::scan::{Assembler, Beam, Mount};
 
-use super::super::{Log, Recorded, bytes};
+use super::super::{Log, Recorded, bytes, thinned};
 use crate::decode::{self, Summary};
 use crate::formats::capture::telemetry;
 use crate::formats::capture::{self, Content};
@@ -43,7 +42,7 @@ pub fn turns(lidar: &str, stream: &[u8]) -> Result<(Vec<Turn>, Summary)> {
         if assembler.push(row.beam, row.turn_starts) {
             let first = recent.len().saturating_sub(assembler.scan().len());
             turns.push(Turn {
-                beams: thinned(recent.split_off(first)),
+                beams: thinned(recent.split_off(first), MOST_BEAMS),
                 ends_at: count,
                 piece: row.piece,
                 wheels: None,
@@ -71,15 +70,6 @@ pub fn turns(lidar: &str, stream: &[u8]) -> Result<(Vec<Turn>, Summary)> {
     Ok((turns, summary))
 }
 
-fn thinned(beams: Vec<Beam>) -> Vec<Beam> {
-    if beams.len() <= MOST_BEAMS {
-        return beams;
-    }
-    let mut decimator = Decimator::new(MOST_BEAMS as u16, Keep::First);
-    let kept = beams.iter().filter_map(|beam| decimator.push(*beam, false));
-    kept.map(|(beam, _)| beam).collect()
-}
-
 /// Reads a capture as a log; the stamps are the sensor's clock at each turn's last beam.
 pub fn read(path: &Path, lidar: &str) -> Result<Log> {
     let content = bytes::load(path)?;
@@ -95,7 +85,8 @@ pub(in crate::formats) fn parse(
     if let Some(capture) = telemetry::capture(&content.bytes) {
         content.bytes = capture;
     }
-    let (turns, summary) = turns(lidar, &content.bytes)?;
+    let model = decode::model(lidar, &content.bytes).with_context(|| name.to_owned())?;
+    let (turns, summary) = turns(model.name, &content.bytes)?;
     ensure!(
         summary.packets > 0,
         "{name}: no packet of an {lidar} in {} bytes; {} failed their check",
@@ -116,7 +107,13 @@ pub(in crate::formats) fn parse(
         });
     let mut log = Log {
         cut: content.cut,
-        robot_from_lidar: mount.unwrap_or(Pose::IDENTITY),
+        mount: Mount {
+            robot_from_lidar: mount.unwrap_or(Pose::IDENTITY),
+            ..Mount::DEFAULT
+        },
+        is_mount_told: mount.is_some(),
+        source: format!("bytes of an {}", model.name),
+        lidar: Some(model.name.to_owned()),
         ..Log::default()
     };
     if summary.check_errors > 0 {
