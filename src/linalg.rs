@@ -44,6 +44,19 @@ impl Sym3 {
         }
     }
 
+    /// `v vᵀ`.
+    #[must_use]
+    pub const fn outer([x, y, t]: [f32; 3]) -> Self {
+        Self {
+            xx: x * x,
+            xy: x * y,
+            xt: x * t,
+            yy: y * y,
+            yt: y * t,
+            tt: t * t,
+        }
+    }
+
     /// Matrix times vector.
     #[must_use]
     pub fn times(&self, v: [f32; 3]) -> [f32; 3] {

@@ -20,11 +20,11 @@ use crate::{
     geometry::Pose,
     matching::{
         Match,
-        correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid, stride},
+        correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid},
         field::{self, FieldConfig},
     },
     math,
-    scan::ScanPoint,
+    scan::{ScanPoint, thinning::thinned},
 };
 use hypotheses::{Hypotheses, Hypothesis};
 use quality::Quality;
@@ -289,9 +289,8 @@ impl<'a, const N: usize> Localizer<'a, N> {
             };
             let wide = self
                 .correlator
-                .align(&self.pyramid.local(), points, predicted, &around);
-            let wide =
-                wide.and_then(|wide| field::align(&field, points, wide.pose, &self.config.field));
+                .best(&self.pyramid.local(), points, predicted, &around);
+            let wide = wide.and_then(|wide| field::align(&field, points, wide, &self.config.field));
             if let Ok(found) = wide {
                 let quality = fitting(&found);
                 if best.is_none_or(|(_, before)| quality.value() > before.value()) {
@@ -338,7 +337,7 @@ impl<'a, const N: usize> Localizer<'a, N> {
         let field = *self.pyramid.field();
         let short = self.config.short();
         let mut some = heapless::Vec::<ScanPoint, N>::new();
-        for &point in points.iter().step_by(stride(points.len(), N)) {
+        for &point in thinned(points, N) {
             let _ = some.push(point);
         }
         self.hypotheses.moved(motion);

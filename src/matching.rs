@@ -3,10 +3,12 @@
 //! Matchers share a shape, `align(reference, points, guess, config) -> Result<Match, MatchError>`. `Ok` means usable.
 
 pub mod correlative;
+mod degeneracy;
 pub mod field;
 pub mod icp;
 pub mod map;
 pub mod virtual_scan;
+mod window_covariance;
 
 use core::fmt;
 
@@ -58,7 +60,7 @@ pub struct Starts {
 
 /// A direction of motion that leaves the match as good as before: along a corridor, about a round room's centre.
 ///
-/// Along it `Match::pose` keeps the guess.
+/// Along it [`Match::pose`] keeps the guess, and is as uncertain as a guess may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DegenerateDirection {
@@ -66,7 +68,7 @@ pub struct DegenerateDirection {
     pub direction: [f32; 3],
     /// What makes a heading comparable with a distance: the points' mean distance (m).
     pub lever: f32,
-    /// Standard deviation along it by the scan alone (m).
+    /// Standard deviation of the pose along it, as in the match's covariance (m).
     pub sigma: f32,
 }
 

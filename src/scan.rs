@@ -6,6 +6,7 @@ pub mod decimator;
 pub mod filter;
 pub mod mount;
 pub mod points;
+pub(crate) mod thinning;
 
 pub use assembler::Assembler;
 pub use beam::{Beam, Bearing, NoReturn, Range};

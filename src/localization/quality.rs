@@ -2,8 +2,7 @@
 
 use crate::{
     geometry::Pose,
-    matching::correlative::stride,
-    scan::ScanPoint,
+    scan::{ScanPoint, thinning::thinned},
     sensor_model::likelihood_field::{Field, placement::Placement},
 };
 
@@ -47,12 +46,12 @@ impl Quality {
                 ..Self::NONE
             };
         };
-        let near = byte_at(field, 1.5);
+        let near = field.scale().byte_at(1.5);
         // Steps of 0.15 m see every surface that a beam crosses: one lies within 0.075 m of a step.
-        let crossing = byte_at(field, 0.075 / field.scale().sigma);
+        let crossing = field.scale().byte_at(0.075 / field.scale().sigma);
         // A beam that only grazes one comes near it, but not onto it.
-        let surface = byte_at(field, 0.25);
-        for point in points.iter().step_by(stride(points.len(), most)) {
+        let surface = field.scale().byte_at(0.25);
+        for point in thinned(points, most) {
             quality.beams += 1;
             let (x, y) = placement.cell(point);
             if field.byte(x, y) >= near {
@@ -102,10 +101,4 @@ impl Quality {
 fn part(end: i16, step: i32, range: u16) -> i16 {
     let scaled = i32::from(end) * step * FINE_MM;
     scaled.checked_div(i32::from(range)).unwrap_or(0) as i16
-}
-
-/// Byte of a cell `sigmas` standard deviations from a surface.
-pub(super) fn byte_at<F: Field + ?Sized>(field: &F, sigmas: f32) -> u8 {
-    let steps = 0.5 * sigmas * sigmas / field.scale().step;
-    255 - crate::math::round_to_i32(crate::math::min(steps, 250.0)) as u8
 }

@@ -8,11 +8,11 @@ use super::{
 use crate::{
     geometry::{Point, Pose},
     matching::{
-        correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid, rotated::Rotated, stride},
+        correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid, rotated::Rotated},
         field,
     },
     math,
-    scan::ScanPoint,
+    scan::{ScanPoint, thinning::thinned},
     sensor_model::likelihood_field::{Field, LikelihoodField},
 };
 
@@ -71,10 +71,10 @@ impl<const N: usize> Search<N> {
         }
         self.points.clear();
         self.few.clear();
-        for point in points.iter().step_by(stride(points.len(), N)) {
+        for point in thinned(points, N) {
             let _ = self.points.push(*point);
         }
-        for point in points.iter().step_by(stride(points.len(), BEAMS)) {
+        for point in thinned(points, BEAMS) {
             let _ = self.few.push(*point);
         }
         self.motion = Pose::IDENTITY;
@@ -228,12 +228,12 @@ impl<const N: usize> Search<N> {
             min_score: 0.05,
             ..CorrelativeConfig::DEFAULT
         };
-        let Ok(best) = correlator.align(&pyramid.local(), &self.points, block, &around) else {
+        let Ok(best) = correlator.best(&pyramid.local(), &self.points, block, &around) else {
             return;
         };
-        let pose = match field::align(pyramid.field(), &self.points, best.pose, &config.short()) {
-            Ok(fine) if alike(fine.pose, best.pose, 0.3, 0.1) => fine.pose,
-            _ => best.pose,
+        let pose = match field::align(pyramid.field(), &self.points, best, &config.short()) {
+            Ok(fine) if alike(fine.pose, best, 0.3, 0.1) => fine.pose,
+            _ => best,
         };
         let quality = Quality::of(pyramid.field(), &self.points, pose, N).value();
         let one = Hypothesis {

@@ -7,11 +7,11 @@
 mod pass;
 
 use self::pass::{CHUNK, Part, Pass, TOGETHER};
-use super::{DegenerateDirection, Match, MatchError};
+use super::{Match, MatchError, degeneracy};
 use crate::{
     geometry::{Point, Pose},
     grid::Shape,
-    linalg::{Covariance, Information, Sym3},
+    linalg::{Covariance, Sym3},
     math,
     scan::points::ScanPoint,
     sensor_model::likelihood_field::{Field, placement::Placement},
@@ -394,36 +394,28 @@ impl Sums {
         } else {
             Covariance(geometry).rotated(field.shape().origin()).0
         };
-        let information = geometry.scaled(1.0 / (sigma * sigma));
         let lever = math::max(self.axes.lever * resolution, 1e-3);
-        let degenerate_direction = self.axes.pairs.and_then(|_| {
-            let [(least, axis), _, (strongest, _)] = geometry.theta_scaled(1.0 / lever).eigen();
-            (least < config.min_curvature_share * strongest).then(|| DegenerateDirection {
-                direction: axis,
-                lever,
-                sigma: sigma / math::sqrt(math::max(least, 1e-3)),
-            })
-        });
-        // Along a degenerate direction nothing is known: 1 m of doubt instead of a singular matrix.
-        let floor = if degenerate_direction.is_some() {
-            1.0
-        } else {
-            0.0
+        let open = match self.axes.pairs {
+            None => None,
+            Some(_) => {
+                let pairs = geometry.theta_scaled(1.0 / lever).eigen();
+                let [_, _, (strongest, _)] = pairs;
+                let threshold = config.min_curvature_share * strongest;
+                degeneracy::find_among(&pairs, lever, threshold)?
+            }
         };
-        let covariance =
-            Information(information.plus(&Sym3::diagonal(floor, floor, floor * lever * lever)))
-                .covariance()
-                .ok_or(MatchError::Degenerate)?;
+        let (information, covariance) =
+            degeneracy::uncertainty(&geometry, sigma * sigma, open.as_ref())?;
         Ok(Match {
             pose,
             covariance,
-            information: Information(information),
+            information,
             inliers: self.inliers,
             overlap: self.overlap,
             beams: beams as u16,
             residual,
             score: self.score(beams, scale.unexplored),
-            degenerate_direction,
+            degenerate_direction: open.map(|open| open.told(&covariance)),
             iterations,
             starts: None,
         })

@@ -2,12 +2,15 @@
 //!
 //! Unlike a likelihood field, it holds it against a pose when free space lies on walls: a check for closed loops.
 
-use super::{DegenerateDirection, MatchError};
+use super::{
+    DegenerateDirection, MatchError, degeneracy,
+    window_covariance::{AS_GOOD, REACH, WindowCovariance},
+};
 use crate::{
     config,
     geometry::{Point, Pose},
     grid::{Grid, occupancy},
-    linalg::{Covariance, Sym3},
+    linalg::Covariance,
     math,
 };
 
@@ -210,6 +213,8 @@ impl Default for MapConfig {
     }
 }
 
+/// What a correlation lower by one costs a pose (nat): e-fold in a twentieth.
+const NATS: f32 = 20.0;
 /// Where one map lies in another, and how far that can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -275,37 +280,52 @@ pub fn align(
         return Err(MatchError::Unlikely { score: value });
     }
     // The top of the parabola through the best value and its neighbours, within half a step.
-    let top = |before: f32, after: f32| {
+    let off = |before: f32, after: f32| {
         let bend = before - 2.0 * value + after;
-        let off = if bend < -1e-6 {
+        let steps = if bend < -1e-6 {
             0.5 * (before - after) / bend
         } else {
             0.0
         };
-        math::min(math::max(off, -0.5), 0.5)
+        math::min(math::max(steps, -0.5), 0.5)
     };
-    let pose = pose(
-        x as f32 + top(score(x - 1, y, t), score(x + 1, y, t)),
-        y as f32 + top(score(x, y - 1, t), score(x, y + 1, t)),
-        t as f32 + top(score(x, y, t - 1), score(x, y, t + 1)),
+    let top = pose(
+        x as f32 + off(score(x - 1, y, t), score(x + 1, y, t)),
+        y as f32 + off(score(x, y - 1, t), score(x, y + 1, t)),
+        t as f32 + off(score(x, y, t - 1), score(x, y, t + 1)),
     );
-    let found = correlate(map, local, pose);
-    let covariance = spread(value, resolution, config.heading_step, |dx, dy, dt| {
-        score(x + dx, y + dy, t + dt)
-    });
+    let mut spread = WindowCovariance::new(resolution, config.heading_step);
+    for dt in -REACH..=REACH {
+        for dy in -REACH..=REACH {
+            for dx in -REACH..=REACH {
+                let [sx, sy, st] = [dx, dy, dt].map(i32::from);
+                let lost = score(x + sx, y + sy, t + st) - value;
+                spread.add([dx, dy, dt], NATS * lost);
+            }
+        }
+    }
+    let mut covariance = spread.covariance(0.0);
     let lever = 0.5 * f32::from(local.shape().width()) * local.shape().resolution();
-    let [_, _, (largest, direction)] = covariance.0.theta_scaled(lever).eigen();
-    // Even values over five cells have a σ of 1.41 cells: nothing holds the pose there.
-    let flat = 1.2 * resolution;
+    let open = spread.open(&covariance, lever);
+    let kept = open.and_then(|open| {
+        let pose = open.keep(top, guess);
+        let there = correlate(map, local, pose);
+        let as_good = NATS * (there.common - value) >= AS_GOOD;
+        (there.cells >= config.min_cells && as_good).then_some((open, pose, there))
+    });
+    if let Some((open, ..)) = kept {
+        let information = covariance.information().ok_or(MatchError::Degenerate)?;
+        (_, covariance) = degeneracy::uncertainty(&information.0, 1.0, Some(&open))?;
+    }
+    let (pose, correlation) = kept.map_or_else(
+        || (top, correlate(map, local, top)),
+        |(_, pose, there)| (pose, there),
+    );
     Ok(MapMatch {
         pose,
         covariance,
-        correlation: found,
-        degenerate_direction: (largest > flat * flat).then(|| DegenerateDirection {
-            direction,
-            lever,
-            sigma: math::sqrt(largest),
-        }),
+        correlation,
+        degenerate_direction: kept.map(|(open, ..)| open.told(&covariance)),
     })
 }
 
@@ -314,53 +334,6 @@ fn steps(setting: &'static str, range: f32, step: f32) -> Result<i32, MatchError
     let max = 20.0 * step;
     config::within(setting, range, 0.0, max).map_err(MatchError::BadConfig)?;
     Ok(math::round_to_i32(range / step))
-}
-
-/// Covariance of the poses up to two steps around the best, each weighted by its correlation: e-fold in a twentieth.
-fn spread(
-    best: f32,
-    resolution: f32,
-    turn_step: f32,
-    score: impl Fn(i32, i32, i32) -> f32,
-) -> Covariance {
-    let (mut sum, mut mean, mut square) = (0.0, [0.0f32; 3], [0.0f32; 6]);
-    for t in -2i32..=2 {
-        for y in -2i32..=2 {
-            for x in -2i32..=2 {
-                let weight = math::weight_exp(math::min((score(x, y, t) - best) * 20.0, 0.0));
-                let at = [
-                    x as f32 * resolution,
-                    y as f32 * resolution,
-                    t as f32 * turn_step,
-                ];
-                sum += weight;
-                for (total, part) in mean.iter_mut().zip(at) {
-                    *total += weight * part;
-                }
-                let [x, y, t] = at;
-                for (total, part) in
-                    square
-                        .iter_mut()
-                        .zip([x * x, x * y, x * t, y * y, y * t, t * t])
-                {
-                    *total += weight * part;
-                }
-            }
-        }
-    }
-    let sum = math::max(sum, 1e-6);
-    let [x, y, t] = mean.map(|m| m / sum);
-    let [xx, xy, xt, yy, yt, tt] = square.map(|s| s / sum);
-    // Steps are even in themselves: a twelfth of their square is always left.
-    let cell = resolution * resolution / 12.0;
-    Covariance(Sym3 {
-        xx: xx - x * x + cell,
-        xy: xy - x * y,
-        xt: xt - x * t,
-        yy: yy - y * y + cell,
-        yt: yt - y * t,
-        tt: tt - t * t + turn_step * turn_step / 12.0,
-    })
 }
 
 #[cfg(test)]

@@ -124,6 +124,12 @@ impl Scale {
     pub fn nats(&self, byte: u8) -> f32 {
         self.floor + self.step * (f32::from(byte) - 1.0)
     }
+
+    /// Byte of a cell `sigmas` standard deviations from a surface.
+    pub(crate) fn byte_at(&self, sigmas: f32) -> u8 {
+        let steps = 0.5 * sigmas * sigmas / self.step;
+        255 - math::round_to_i32(math::min(steps, 250.0)) as u8
+    }
 }
 
 /// The bytes of a model by squared distance: 528 bytes, made once, used where fields are built.

@@ -19,7 +19,7 @@ use beamfix::{
         tiles::Tiles,
     },
 };
-use beamfix_sim::{home, noise::Noise, pose::TruePose, scenes};
+use beamfix_sim::{home, noise::Noise, pose::TruePose, scenes, world::World};
 use host_tests::formats::ros_map;
 
 #[test]
@@ -75,17 +75,46 @@ fn tiles_hold_what_one_table_holds() {
 }
 
 /// A local map of 8 m around `pose`, from scans along a short way, in the frame of `pose`.
-fn local_map(pose: TruePose, noise: &mut Noise) -> Grid<Vec<u8>> {
-    let world = home::home();
+fn local_map(world: &World, pose: TruePose, noise: &mut Noise) -> Grid<Vec<u8>> {
     let shape = Shape::new(160, 160, 0.05, Pose::new(-4.0, -4.0, 0.0)).expect("good");
     let mut local = Grid::new(shape, vec![occupancy::UNKNOWN; shape.len()]).expect("fits");
     for step in 0..5 {
         let way = TruePose::new(0.05 * f64::from(step), 0.0, 0.05 * f64::from(step));
-        let points = points_from(&world, pose.then(way), 450, noise);
+        let points = points_from(world, pose.then(way), 450, noise);
         occupancy::update(&mut local, way.into(), &points, &UpdateConfig::DEFAULT);
     }
     occupancy::decide(local.cells_mut());
     local
+}
+
+/// Two maps of a corridor without ends slide along each other (D8): the guess is kept along it, and the covariance says
+/// that only the guess is known.
+#[test]
+fn maps_of_a_corridor_keep_the_guess_along_it() {
+    let world = scenes::corridor();
+    let mut noise = Noise::new(1, 33);
+    let [mut whole, mut local] = [0.0, 0.3].map(|x| {
+        let place = TruePose::new(x, 0.1, 0.0);
+        local_map(&world, place, &mut noise)
+    });
+    map::smooth(&mut whole, Kernel::Five);
+    map::smooth(&mut local, Kernel::Five);
+    // The local map lies 0.3 m on; the guess is off by 0.12 m along the corridor and 0.06 m across.
+    let guess = Pose::new(0.42, 0.06, 0.01);
+    let found = map::align(
+        &whole.as_slice(),
+        &local.as_slice(),
+        guess,
+        &MapConfig::DEFAULT,
+    )
+    .expect("a match");
+    let open = found.degenerate_direction.expect("open along the corridor");
+    assert!(open.direction[0].abs() > 0.99, "{found:?}");
+    // Directions are found to a hundredth: 1 mm of the 6 cm across.
+    assert!((found.pose.x - guess.x).abs() < 0.005, "{found:?}");
+    // Half a cell.
+    assert!(found.pose.y.abs() < 0.025, "{found:?}");
+    assert!(found.covariance.0.xx > 0.2 * 0.2, "{found:?}");
 }
 
 #[test]
@@ -99,7 +128,7 @@ fn local_maps_are_found_in_the_map_and_elsewhere_they_do_not_correlate() {
         let mut noise = Noise::new(seed, 32);
         let rough = ros_map::of_world(&world, low, high, 0.05, home::INSIDE).expect("a map");
         let truth = home::home_place(&world, &rough, 0.4, &mut noise);
-        let mut local = local_map(truth, &mut noise);
+        let mut local = local_map(&world, truth, &mut noise);
         map::smooth(&mut local, Kernel::Five);
         let guess = Pose::from(truth)
             * Pose::new(

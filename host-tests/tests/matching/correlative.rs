@@ -181,19 +181,22 @@ fn a_corridor_is_weak_along_itself_and_two_equal_rooms_are_ambiguous() {
         .expect("fits")
         .local();
     let mut correlator = Correlator::<120>::new();
+    let guess = Pose::new(0.11, 0.03, 0.01);
     let found = correlator
-        .align(
-            &pyramid,
-            &points,
-            Pose::IDENTITY,
-            &CorrelativeConfig::DEFAULT,
-        )
+        .align(&pyramid, &points, guess, &CorrelativeConfig::DEFAULT)
         .expect("a match");
     let weak = found.degenerate_direction.expect("a weak direction");
     // The corridor runs along -0.3 rad in the lidar's frame.
     let (s, c) = beamfix::math::sin_cos(0.3);
     let along = weak.direction[0] * c - weak.direction[1] * s;
     assert!(along.abs() > 0.98, "{found:?}");
+    // Along it the guess is kept (D8), across it the lidar is where it was: to a cell.
+    let off = found.pose.between(guess);
+    let [kept, across] = [off.x * c - off.y * s, found.pose.x * s + found.pose.y * c];
+    assert!(kept.abs() < 0.01 && across.abs() < 0.05, "{found:?}");
+    // And nobody claims to know it.
+    let row = [c, -s, 0.0];
+    assert!(found.covariance.0.quadratic(row) > 0.2 * 0.2, "{found:?}");
     let newton = field::align(
         &field.as_slice(),
         &points,

@@ -476,10 +476,10 @@ fn a_corridor_is_weak_along_it_and_keeps_the_guess() {
             .degenerate_direction
             .unwrap_or_else(|| panic!("seed {seed}: {found:?}"));
         assert!(weak.direction[0].abs() > 0.98, "seed {seed}: {weak:?}");
-        // The scan knows nothing along the corridor: metres; and a centimetre at most across it.
+        // Along the corridor only the guess is known, to 0.3 m; across it the scan tells to a centimetre at most.
         let [x, y, _] = weak.direction;
         let across = found.covariance.0.quadratic([-y, x, 0.0]);
-        assert!(weak.sigma > 5.0 && across < 1e-4, "seed {seed}: {found:?}");
+        assert!(weak.sigma > 0.2 && across < 1e-4, "seed {seed}: {found:?}");
         let pose = TruePose::from(found.pose);
         assert!((pose.x - 0.05).abs() < 0.01, "seed {seed}: {found:?}");
         assert!(

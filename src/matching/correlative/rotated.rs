@@ -1,9 +1,9 @@
 //! A scan with one heading, ready to be summed at many places: each beam an index, four places an addition.
 
-use super::{pyramid::Pyramid, stride};
+use super::pyramid::Pyramid;
 use crate::{
     geometry::Pose,
-    scan::points::ScanPoint,
+    scan::{ScanPoint, thinning::thinned},
     sensor_model::likelihood_field::{Field, placement::Placement},
 };
 
@@ -54,7 +54,7 @@ impl<const N: usize> Rotated<N> {
         let Some(placement) = Placement::new(pyramid.field().shape(), corner) else {
             return false;
         };
-        for point in points.iter().step_by(stride(points.len(), N)) {
+        for point in thinned(points, N) {
             let (x, y) = placement.place(point);
             // Coordinates are modulo 2³²; what is left of zero is far right until the shift keeps its sign.
             let cell = |place: u32| {

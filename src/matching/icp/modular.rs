@@ -22,7 +22,7 @@ pub mod weighting;
 
 use crate::{
     geometry::{Point, Pose},
-    matching::{Match, MatchError},
+    matching::{Match, MatchError, degeneracy},
     math,
     scan::ScanPoint,
 };
@@ -193,7 +193,7 @@ where
     chosen.fill(false);
     stages.selection.select(current, chosen);
     stages.correspondence.prepare(reference);
-    let lever = verdict::mean_range(current.points);
+    let lever = degeneracy::mean_range(current.points);
     let (mut pose, mut passes) = (guess, 0);
     loop {
         passes += 1;

@@ -2,17 +2,18 @@
 
 use crate::{
     geometry::Pose,
-    linalg::{Covariance, Information, Sym3},
+    linalg::Sym3,
     matching::{
-        DegenerateDirection, Match, MatchError,
+        Match, MatchError,
+        degeneracy::{self, Open},
         icp::modular::{Cloud, Limits, Pair, minimisation::normal_equations},
     },
     math,
     scan::ScanPoint,
 };
 
-/// Share of the weight below which a direction is not determined, as in `icp::projective::verdict`.
-const WEAK_SHARE: f32 = 0.02;
+/// Share of the weight below which a direction is not determined, as in `IcpConfig::min_constraint_share`.
+const MIN_CONSTRAINT_SHARE: f32 = 0.02;
 /// Longest last step of a match that is believed (m, rad).
 const TOO_LONG: (f32, f32) = (0.01, 0.005);
 /// Distance at which a pair counts half in the score (m).
@@ -55,16 +56,14 @@ pub(super) fn enough_pairs(pairs: &[Pair], limits: &Limits) -> Result<(), MatchE
     Ok(())
 }
 
-/// What the pairs determine: the information but for its scale, and the direction that they leave open, if one.
+/// What the pairs determine: the curvature of the cost, and the direction that they leave open, if one.
 pub(super) struct Determined {
     h: Sym3,
-    /// Curvature and unit vector over (x, y, heading · lever).
-    open: Option<(f32, [f32; 3])>,
-    lever: f32,
+    open: Option<Open>,
 }
 
 impl Determined {
-    /// `lever`: see [`mean_range`].
+    /// `lever`: see [`degeneracy::mean_range`].
     pub fn by(
         pairs: &[Pair],
         reference: Cloud<'_>,
@@ -72,44 +71,19 @@ impl Determined {
         lever: f32,
     ) -> Result<Self, MatchError> {
         let (h, _) = normal_equations(pairs, reference, pose);
-        let [least, middle, _] = h.theta_scaled(1.0 / lever).eigen();
         let weight = counting(pairs).fold(0.0, |sum, pair| sum + pair.weight);
-        let threshold = WEAK_SHARE * weight;
-        if !(middle.0 >= threshold) {
-            return Err(MatchError::Degenerate);
-        }
-        let open = (least.0 < threshold).then_some(least);
-        Ok(Self { h, open, lever })
+        let open = degeneracy::find(
+            &h.theta_scaled(1.0 / lever),
+            lever,
+            MIN_CONSTRAINT_SHARE * weight,
+        )?;
+        Ok(Self { h, open })
     }
 
-    /// The information but for its scale, without the open direction's: that little is the normals' noise.
-    fn known(&self) -> Sym3 {
-        let Some((curvature, [x, y, t])) = self.open else {
-            return self.h;
-        };
-        let t = t * self.lever;
-        let outer = Sym3 {
-            xx: x * x,
-            xy: x * y,
-            xt: x * t,
-            yy: y * y,
-            yt: y * t,
-            tt: t * t,
-        };
-        self.h.plus(&outer.scaled(-curvature))
-    }
-
-    /// The motion without its part along the open direction: Zhang, Kaess, Singh, ICRA 2016.
+    /// The motion without its part along the open direction.
     pub fn part_of(&self, motion: Pose) -> Pose {
-        let Some((_, [x, y, t])) = self.open else {
-            return motion;
-        };
-        let along = x * motion.x + y * motion.y + t * motion.theta * self.lever;
-        Pose::new(
-            motion.x - along * x,
-            motion.y - along * y,
-            motion.theta - along * t / self.lever,
-        )
+        self.open
+            .map_or(motion, |open| open.keep(motion, Pose::IDENTITY))
     }
 }
 
@@ -140,47 +114,20 @@ pub(super) fn judge(
         residual * residual,
         limits.min_range_sigma * limits.min_range_sigma,
     );
-    let moved = determined.part_of(Pose::new(
-        pose.x - guess.x,
-        pose.y - guess.y,
-        pose.theta - guess.theta,
-    ));
-    let information = determined.known().scaled(1.0 / noise);
-    // A direction that is not determined at all still has a finite variance: 10 m, 10 rad.
-    let bounded = information.plus(&Sym3::diagonal(0.01, 0.01, 0.01));
-    let covariance = bounded.inverse().ok_or(MatchError::Degenerate)?;
-    let degenerate_direction = determined.open.map(|(_, direction)| {
-        let [x, y, t] = direction;
-        let variance = covariance.quadratic([x, y, t * determined.lever]);
-        DegenerateDirection {
-            direction,
-            lever: determined.lever,
-            sigma: math::sqrt(variance),
-        }
-    });
+    let open = determined.open;
+    let pose = open.map_or(pose, |open| open.keep(pose, guess));
+    let (information, covariance) = degeneracy::uncertainty(&determined.h, noise, open.as_ref())?;
     Ok(Match {
-        pose: Pose::new(
-            guess.x + moved.x,
-            guess.y + moved.y,
-            guess.theta + moved.theta,
-        ),
-        covariance: Covariance(covariance),
-        information: Information(information),
+        pose,
+        covariance,
+        information,
         inliers: counting(pairs).count() as u16,
         overlap: pairs.len() as u16,
         beams: current.points.len() as u16,
         score: score / pairs.len() as f32,
         residual,
-        degenerate_direction,
+        degenerate_direction: open.map(|open| open.told(&covariance)),
         iterations,
         starts: None,
     })
-}
-
-/// Mean distance of the points (m), which makes a heading comparable with a distance.
-pub(super) fn mean_range(points: &[ScanPoint]) -> f32 {
-    let sum = points
-        .iter()
-        .fold(0.0, |sum, p| sum + f32::from(p.range) * 1e-3);
-    math::max(sum / points.len() as f32, 0.1)
 }
