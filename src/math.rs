@@ -1,7 +1,7 @@
 //! The crate's only elementary functions: the same bits on every machine, with the error stated.
 //!
 //! Call them as functions. A method such as `x.sin()` is std's on the host and has other bits there; clippy's
-//! `disallowed_methods` refuses it. Each error below is measured against `f64` in `host-tests/tests/house/math.rs`.
+//! `disallowed_methods` refuses it. Each error below is measured against `f64` in `host-tests/house/src/math.rs`.
 //!
 //! | function | domain | largest error | cost on an M4F |
 //! | --- | --- | --- | --- |

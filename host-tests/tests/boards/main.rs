@@ -10,6 +10,7 @@ mod fields;
 mod lidar_cost;
 mod mavlink;
 mod on_target;
+mod readme;
 mod supervisor;
 mod telemetry;
 mod text;

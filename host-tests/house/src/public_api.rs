@@ -29,7 +29,7 @@ struct Item {
 
 /// What rustdoc says of the library; says so where there is no nightly toolchain.
 fn rustdoc() -> Option<Value> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let target = root.join("target/rustdoc");
     let output = Command::new("cargo")
         .args([
@@ -164,7 +164,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// `cargo test --release -p host-tests --test house -- public_api --nocapture` prints the list.
+/// `cargo test --release -p beamfix-house public -- --nocapture` prints the list.
 #[test]
 fn public_items_are_few_and_known() {
     let Some(json) = rustdoc() else { return };

@@ -63,7 +63,7 @@ struct Found {
 impl Source {
     /// Reads the library.
     pub fn read() -> Self {
-        let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("../src");
+        let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../src");
         let mut source = Self::default();
         let mut files = Vec::new();
         walk(&src, &mut files);

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::source::{Import, Source};
 
 /// The rooms from the top down. A room imports what stands below it, nothing beside it, nothing above.
-const FLOORS: [&[&str]; 8] = [
+const FLOORS: [&[&str]; 9] = [
     &["pipeline"],
     &["odometry", "localization", "slam"],
     &["matching"],
@@ -14,6 +14,7 @@ const FLOORS: [&[&str]; 8] = [
     &["scan", "linalg"],
     &["geometry"],
     &["math"],
+    &["config"],
 ];
 
 /// Wings of a room, from the top down, with the same rule. A room's own page, `lidar.rs`, belongs to none.

@@ -1,0 +1,46 @@
+//! What the pages name is there.
+
+use std::{fs, path::Path};
+
+/// Pages, and folders of pages.
+const PAGES: [&str; 6] = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "boards/README.md",
+    "docs",
+    "src/math.rs",
+];
+
+/// Paths in backquotes that start so are checked.
+const FOLDERS: [&str; 4] = ["src/", "host-tests/", "boards/", "docs/"];
+
+#[test]
+fn every_file_that_a_page_names_exists() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut pages = Vec::new();
+    for page in PAGES {
+        let path = root.join(page);
+        match fs::read_dir(&path) {
+            Ok(entries) => pages.extend(entries.map(|entry| entry.expect("an entry").path())),
+            Err(_) => pages.push(path),
+        }
+    }
+    let (mut missing, mut named) = (Vec::new(), 0);
+    for page in pages {
+        let text = fs::read_to_string(&page).unwrap_or_else(|error| panic!("{page:?}: {error}"));
+        for word in text.split('`').skip(1).step_by(2) {
+            let is_path = FOLDERS.iter().any(|folder| word.starts_with(folder))
+                // A pattern, a command or a path with a line or an item.
+                && !word.contains([' ', '*', ':', '<', '{', '\n']);
+            if is_path {
+                named += 1;
+                if !root.join(word).exists() {
+                    missing.push(format!("{}: {word}", page.display()));
+                }
+            }
+        }
+    }
+    assert!(named > 40, "the test finds names: {named}");
+    assert!(missing.is_empty(), "not there:\n{}", missing.join("\n"));
+}
