@@ -23,6 +23,7 @@ pub mod localization;
 pub mod matching;
 pub mod math;
 pub mod odometry;
+pub mod pipeline;
 pub mod scan;
 pub mod sensor_model;
 

@@ -10,62 +10,17 @@ mod deskew;
 mod keyframes;
 mod motion;
 mod prior;
+mod state;
 mod step;
 
 pub use config::OdometryConfig;
+pub use state::Odometry;
 pub use step::{Counters, Refusal, Step};
 
-use crate::{
-    geometry::{EgoMotion, Pose, Twist},
-    keyframe::Keyframe,
-    linalg::{Covariance, Sym3},
-    matching::icp::Reference,
-    math,
-    scan::{Points, Scan},
-};
+use crate::{geometry::EgoMotion, math, scan::Scan};
 use attempt::Attempt;
-use deskew::Deskewed;
-use motion::Motion;
-
-/// Pose from scans, in fixed memory.
-///
-/// 20·N + 300 bytes: a keyframe's lines and the current scan's points. N is the most beams of a revolution; beyond that
-/// it does not change the result, which depends on [`OdometryConfig::directions`] alone.
-#[derive(Debug, Clone)]
-pub struct Odometry<const N: usize> {
-    config: OdometryConfig,
-    deskewed: Deskewed<N>,
-    keyframe: Keyframe<Reference<N>>,
-    pose: Pose,
-    covariance: Covariance,
-    motion: Motion,
-    end_us: u32,
-    refused_in_a_row: u8,
-    counters: Counters,
-}
 
 impl<const N: usize> Odometry<N> {
-    /// At the origin, with nothing seen yet.
-    #[must_use]
-    pub const fn new(config: OdometryConfig) -> Self {
-        Self {
-            config,
-            deskewed: Deskewed::EMPTY,
-            keyframe: Keyframe::at_origin(Reference::with_directions(config.directions)),
-            pose: Pose::IDENTITY,
-            covariance: Covariance(Sym3::diagonal(0.0, 0.0, 0.0)),
-            motion: Motion::STANDING,
-            end_us: 0,
-            refused_in_a_row: 0,
-            counters: Counters {
-                scans: 0,
-                refused: 0,
-                keyframes: 0,
-                lost: 0,
-            },
-        }
-    }
-
     /// Takes a scan in and says where the robot is.
     ///
     /// `ego` is the robot's motion since the last scan's end as its wheels and gyroscope measured it. Without them the
@@ -114,41 +69,4 @@ impl<const N: usize> Odometry<N> {
             keyframe,
         }
     }
-
-    /// The robot at the end of the last scan, in the frame in which it started (m, rad).
-    #[must_use]
-    pub const fn pose(&self) -> Pose {
-        self.pose
-    }
-
-    /// The robot's velocity during the last scan.
-    #[must_use]
-    pub const fn twist(&self) -> Twist {
-        self.motion.twist
-    }
-
-    /// The last scan's points, in the lidar's frame at the scan's end.
-    #[must_use]
-    pub const fn points(&self) -> &Points<N> {
-        &self.deskewed.points
-    }
-
-    /// The scan that the next one is matched against, and where the robot was.
-    #[must_use]
-    pub const fn keyframe(&self) -> &Keyframe<Reference<N>> {
-        &self.keyframe
-    }
-
-    /// Scans, refusals and keyframes since the start.
-    #[must_use]
-    pub const fn counters(&self) -> Counters {
-        self.counters
-    }
-}
-
-/// How far apart two poses are (m, rad), if by more than `limit` metres or twice as many radians.
-fn farther(a: Pose, b: Pose, limit: f32) -> Option<(f32, f32)> {
-    let off = a.between(b);
-    let (distance, rotation) = (off.distance(), math::abs(off.theta));
-    (distance > limit || rotation > 2.0 * limit).then_some((distance, rotation))
 }

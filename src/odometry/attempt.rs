@@ -1,8 +1,10 @@
 //! Matching a scan: at the prior, and where that fails at other poses and other turn rates.
 
 use super::{
-    Odometry, Refusal, farther,
-    prior::{Prior, Times},
+    motion::Times,
+    prior::{Prior, farther},
+    state::Odometry,
+    step::Refusal,
 };
 use crate::{
     geometry::{Pose, Twist},

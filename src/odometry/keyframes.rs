@@ -1,6 +1,6 @@
 //! When a scan becomes the keyframe, and what is counted.
 
-use super::{Odometry, Refusal};
+use super::{state::Odometry, step::Refusal};
 use crate::{
     matching::{Match, icp},
     math,

@@ -4,11 +4,19 @@
 //! middle in place to first order. So motion is measured from middle to middle: from end to end, half of each error
 //! would return with the other sign, scan after scan.
 
-use super::prior::Times;
 use crate::{
     geometry::{Pose, Twist},
     math,
 };
+
+/// When a scan was taken.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Times {
+    /// From the last scan's end to its own (s).
+    pub seconds: f32,
+    /// From its first beam to its last (s).
+    pub duration: f32,
+}
 
 /// Motion up to the last scan.
 #[derive(Debug, Clone)]

@@ -1,21 +1,12 @@
 //! Where the robot should be before its scan is looked at.
 
-use super::{Odometry, farther};
+use super::{motion::Times, state::Odometry};
 use crate::{
     geometry::{EgoMotion, Pose, Twist},
     linalg::{Covariance, Sym3},
     math,
     scan::Scan,
 };
-
-/// When a scan was taken.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Times {
-    /// From the last scan's end to its own (s).
-    pub seconds: f32,
-    /// From its first beam to its last (s).
-    pub duration: f32,
-}
 
 /// What wheels, gyroscope and the last velocity say about a scan.
 pub(super) struct Prior {
@@ -115,4 +106,11 @@ fn wheel_motion(ego: EgoMotion) -> Option<Pose> {
     const FARTHEST: f32 = 32.0;
     ego.motion()
         .filter(|motion| motion.is_finite() && motion.distance() < FARTHEST)
+}
+
+/// How far apart two poses are (m, rad), if by more than `limit` metres or twice as many radians.
+pub(super) fn farther(a: Pose, b: Pose, limit: f32) -> Option<(f32, f32)> {
+    let off = a.between(b);
+    let (distance, rotation) = (off.distance(), math::abs(off.theta));
+    (distance > limit || rotation > 2.0 * limit).then_some((distance, rotation))
 }

@@ -107,6 +107,12 @@ impl<const N: usize> Assembler<N> {
         }
     }
 
+    /// Takes the beams of a whole revolution at once, in place of the present one: [`Assembler::scan`] then has them.
+    pub fn assign(&mut self, beams: impl Iterator<Item = Beam>) {
+        self.restart();
+        beams.for_each(|beam| self.keep(beam));
+    }
+
     /// Takes the next beam; `true` when [`Assembler::scan`] is a whole revolution.
     ///
     /// `starts` says that this beam is the first of a revolution. The scan stays until the next push.

@@ -1,0 +1,80 @@
+//! What the odometry remembers from scan to scan.
+
+use super::{config::OdometryConfig, deskew::Deskewed, motion::Motion, step::Counters};
+use crate::{
+    geometry::{Pose, Twist},
+    keyframe::Keyframe,
+    linalg::{Covariance, Sym3},
+    matching::icp::Reference,
+    scan::Points,
+};
+
+/// Pose from scans, in fixed memory.
+///
+/// 20·N + 300 bytes: a keyframe's lines and the current scan's points. N is the most beams of a revolution; beyond that
+/// it does not change the result, which depends on [`OdometryConfig::directions`] alone.
+#[derive(Debug, Clone)]
+pub struct Odometry<const N: usize> {
+    pub(super) config: OdometryConfig,
+    pub(super) deskewed: Deskewed<N>,
+    pub(super) keyframe: Keyframe<Reference<N>>,
+    pub(super) pose: Pose,
+    pub(super) covariance: Covariance,
+    pub(super) motion: Motion,
+    pub(super) end_us: u32,
+    pub(super) refused_in_a_row: u8,
+    pub(super) counters: Counters,
+}
+
+impl<const N: usize> Odometry<N> {
+    /// At the origin, with nothing seen yet.
+    #[must_use]
+    pub const fn new(config: OdometryConfig) -> Self {
+        Self {
+            config,
+            deskewed: Deskewed::EMPTY,
+            keyframe: Keyframe::at_origin(Reference::with_directions(config.directions)),
+            pose: Pose::IDENTITY,
+            covariance: Covariance(Sym3::diagonal(0.0, 0.0, 0.0)),
+            motion: Motion::STANDING,
+            end_us: 0,
+            refused_in_a_row: 0,
+            counters: Counters {
+                scans: 0,
+                refused: 0,
+                keyframes: 0,
+                lost: 0,
+            },
+        }
+    }
+
+    /// The robot at the end of the last scan, in the frame in which it started (m, rad).
+    #[must_use]
+    pub const fn pose(&self) -> Pose {
+        self.pose
+    }
+
+    /// The robot's velocity during the last scan.
+    #[must_use]
+    pub const fn twist(&self) -> Twist {
+        self.motion.twist
+    }
+
+    /// The last scan's points, in the lidar's frame at the scan's end.
+    #[must_use]
+    pub const fn points(&self) -> &Points<N> {
+        &self.deskewed.points
+    }
+
+    /// The scan that the next one is matched against, and where the robot was.
+    #[must_use]
+    pub const fn keyframe(&self) -> &Keyframe<Reference<N>> {
+        &self.keyframe
+    }
+
+    /// Scans, refusals and keyframes since the start.
+    #[must_use]
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+}

@@ -1,0 +1,140 @@
+//! From bytes to poses: the one road that a board, a PC, C and a browser share.
+//!
+//! ```text
+//! bytes ─▶ Protocol ─▶ beams ─▶ Assembler ─▶ revolution ─▶ Estimator ─▶ step
+//! wheels, gyroscope ─▶ motion since the last revolution ───┘
+//! ```
+//!
+//! [`Pipeline`] takes bytes of a lidar, [`Tracker`] below it takes beams or whole scans, for logs without bytes. Which
+//! lidar and which estimator are types: [`Odometry`](crate::odometry::Odometry) needs nothing but scans,
+//! [`MapLocalizer`] a map too.
+//!
+//! Every input has a time (µs, wrapping) on one clock, the caller's: [`Pipeline::set_time`] says when the bytes pushed
+//! next came in, wheels and gyroscope bring theirs. A revolution ends when the byte that completes it comes in; what the
+//! wheels said is interpolated there, so their messages may come at any rate, and one may be lost.
+
+mod estimator;
+mod gyro;
+mod map_localizer;
+mod tracker;
+mod wheels;
+
+pub use estimator::{Estimate, Estimator, Verdict};
+pub use map_localizer::{Located, MapLocalizer};
+pub use tracker::{Revolution, Tracker};
+
+use crate::lidar::{Packet, Protocol};
+
+/// A lidar's bytes, wheels and a gyroscope in, a step for each revolution out.
+///
+/// The parser, one packet, and a [`Tracker`]; N is the most beams of a revolution.
+///
+/// ```
+/// use beamfix::lidar::ld06;
+/// use beamfix::odometry::{Odometry, OdometryConfig};
+/// use beamfix::pipeline::{Pipeline, Revolution};
+///
+/// let odometry = Odometry::<456>::new(OdometryConfig::DEFAULT);
+/// let mut pipeline = Pipeline::new(ld06::Parser::new(), odometry);
+/// pipeline.set_time(20_000); // what the board's clock says (µs)
+/// pipeline.push(&[0x54, 0x2c], &mut |revolution: Revolution<Odometry<456>, 456>| {
+///     println!("{:?}", revolution.step.pose);
+/// });
+/// ```
+#[derive(Debug)]
+pub struct Pipeline<P: Protocol, E, const N: usize> {
+    lidar: P,
+    /// Here rather than on the stack, where it would lie below a match.
+    packet: Option<P::Packet>,
+    tracker: Tracker<E, N>,
+}
+
+/// What takes the results of a [`Pipeline`]. A closure over [`Revolution`] is one.
+pub trait Sink<P, E: Estimator<N>, const N: usize> {
+    /// A revolution went through the estimator.
+    fn revolution(&mut self, revolution: Revolution<'_, E, N>);
+
+    /// All beams of a packet were taken; the revolution that it completed was given before.
+    fn packet(&mut self, packet: &P) {
+        let _ = packet;
+    }
+}
+
+impl<F, P, E: Estimator<N>, const N: usize> Sink<P, E, N> for F
+where
+    F: FnMut(Revolution<'_, E, N>),
+{
+    fn revolution(&mut self, revolution: Revolution<'_, E, N>) {
+        self(revolution);
+    }
+}
+
+impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
+    /// Waits for the first whole revolution.
+    #[must_use]
+    pub const fn new(lidar: P, estimator: E) -> Self {
+        Self {
+            lidar,
+            packet: None,
+            tracker: Tracker::new(estimator),
+        }
+    }
+
+    /// Says when the bytes and beams pushed next came in (µs, wrapping).
+    pub fn set_time(&mut self, now_us: u32) {
+        self.lidar.arrived(now_us);
+        self.tracker.set_time(now_us);
+    }
+
+    /// Takes bytes of the lidar, in pieces of any size: the steps are the same.
+    ///
+    /// The byte that completes a revolution costs what the estimator's update does; a board must buffer what comes
+    /// meanwhile.
+    pub fn push(&mut self, bytes: &[u8], sink: &mut impl Sink<P::Packet, E, N>) {
+        for &byte in bytes {
+            self.receive(byte);
+            self.pass_on(sink);
+        }
+    }
+
+    /// Takes the packets that the parser has held back: for the end of a recording.
+    pub fn finish(&mut self, sink: &mut impl Sink<P::Packet, E, N>) {
+        loop {
+            self.packet = self.lidar.pull();
+            if self.packet.is_none() {
+                return;
+            }
+            self.pass_on(sink);
+        }
+    }
+
+    /// Apart, so that what the parser needs is not on the stack during a match.
+    #[inline(never)]
+    fn receive(&mut self, byte: u8) {
+        self.packet = self.lidar.push(byte);
+    }
+
+    fn pass_on(&mut self, sink: &mut impl Sink<P::Packet, E, N>) {
+        if let Some(packet) = &self.packet {
+            let (beams, start) = (packet.beams(), packet.revolution_start());
+            self.tracker
+                .push_packet(beams, start, |revolution| sink.revolution(revolution));
+            sink.packet(packet);
+        }
+    }
+
+    /// The parser, for its counters.
+    pub const fn lidar(&self) -> &P {
+        &self.lidar
+    }
+
+    /// What stands behind the parser, for its counters and poses.
+    pub const fn tracker(&self) -> &Tracker<E, N> {
+        &self.tracker
+    }
+
+    /// What stands behind the parser, to give it wheels, a gyroscope, or beams that came without bytes.
+    pub const fn tracker_mut(&mut self) -> &mut Tracker<E, N> {
+        &mut self.tracker
+    }
+}
