@@ -291,6 +291,22 @@ impl Information {
 }
 
 impl Covariance {
+    /// The entries xx, xy, yy (m²), xθ, yθ (m·rad), θθ (rad²): the order of every table and message of this project.
+    ///
+    /// x and y are those of the frame in which the pose is given, not the robot's own.
+    #[must_use]
+    pub const fn to_array(self) -> [f32; 6] {
+        let Sym3 {
+            xx,
+            xy,
+            xt,
+            yy,
+            yt,
+            tt,
+        } = self.0;
+        [xx, xy, yy, xt, yt, tt]
+    }
+
     /// The information it stands for; `None` unless it is positive definite.
     #[must_use]
     pub fn information(&self) -> Option<Information> {

@@ -73,9 +73,10 @@ pub struct DegenerateDirection {
 }
 
 /// Why there is no pose.
+///
+/// Exhaustive: telemetry names every reason, and a new one must not go unnamed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 pub enum MatchError {
     /// The scan has too few beams with a range.
     TooFewBeams {

@@ -91,10 +91,19 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
     /// The byte that completes a revolution costs what the estimator's update does; a board must buffer what comes
     /// meanwhile.
     pub fn push(&mut self, bytes: &[u8], sink: &mut impl Sink<P::Packet, E, N>) {
-        for &byte in bytes {
-            self.receive(byte);
-            self.pass_on(sink);
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let taken = self.push_packet(rest, sink);
+            rest = rest.get(taken..).unwrap_or_default();
         }
+    }
+
+    /// Takes bytes of the lidar up to the end of a packet; gives their number. For who must send a packet's results
+    /// before there is room for the next one's.
+    pub fn push_packet(&mut self, bytes: &[u8], sink: &mut impl Sink<P::Packet, E, N>) -> usize {
+        let taken = self.receive(bytes);
+        self.pass_on(sink);
+        taken
     }
 
     /// Takes the packets that the parser has held back: for the end of a recording.
@@ -110,8 +119,16 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
 
     /// Apart, so that what the parser needs is not on the stack during a match.
     #[inline(never)]
-    fn receive(&mut self, byte: u8) {
-        self.packet = self.lidar.push(byte);
+    fn receive(&mut self, bytes: &[u8]) -> usize {
+        let mut taken = 0;
+        for &byte in bytes {
+            taken += 1;
+            self.packet = self.lidar.push(byte);
+            if self.packet.is_some() {
+                break;
+            }
+        }
+        taken
     }
 
     fn pass_on(&mut self, sink: &mut impl Sink<P::Packet, E, N>) {
@@ -136,5 +153,11 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
     /// What stands behind the parser, to give it wheels, a gyroscope, or beams that came without bytes.
     pub const fn tracker_mut(&mut self) -> &mut Tracker<E, N> {
         &mut self.tracker
+    }
+
+    /// What stands behind the parser, at the end.
+    #[must_use]
+    pub fn into_tracker(self) -> Tracker<E, N> {
+        self.tracker
     }
 }

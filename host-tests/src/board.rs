@@ -174,9 +174,7 @@ impl Replay {
     pub fn on_host(commands: &Commands, beams: usize) -> Self {
         let mut app = Here::new(beams);
         let mut sent = app.ready().to_vec();
-        for &byte in commands.bytes() {
-            sent.extend_from_slice(app.command(byte));
-        }
+        app.command(commands.bytes(), |out| sent.extend_from_slice(out));
         Self::from_bytes(&sent).expect("the frames were just made")
     }
 
@@ -291,19 +289,19 @@ impl Here {
         }
     }
 
-    /// As [`App::lidar`].
-    pub fn lidar(&mut self, byte: u8) -> &[u8] {
+    /// As [`App::lidar_all`].
+    pub fn lidar(&mut self, bytes: &[u8], send: impl FnMut(&[u8])) {
         match self {
-            Self::Usual(app) => app.lidar(byte),
-            Self::Small(app) => app.lidar(byte),
+            Self::Usual(app) => app.lidar_all(bytes, send),
+            Self::Small(app) => app.lidar_all(bytes, send),
         }
     }
 
-    /// As [`App::command`].
-    pub fn command(&mut self, byte: u8) -> &[u8] {
+    /// As [`App::command_all`].
+    pub fn command(&mut self, bytes: &[u8], send: impl FnMut(&[u8])) {
         match self {
-            Self::Usual(app) => app.command(byte),
-            Self::Small(app) => app.command(byte),
+            Self::Usual(app) => app.command_all(bytes, send),
+            Self::Small(app) => app.command_all(bytes, send),
         }
     }
 

@@ -20,6 +20,7 @@ use std::path::Path;
 
 use anyhow::{Result, bail, ensure};
 use beamfix::geometry::Pose;
+use beamfix::lidar::Model;
 use beamfix::scan::decimator::{Decimator, Keep};
 use beamfix::scan::{Beam, Mount};
 
@@ -71,6 +72,18 @@ pub struct Log {
     pub odd: Odd,
     /// Why the file ends before it should.
     pub cut: Option<String>,
+    /// The bytes that the scans were decoded from, where the pipeline can take these instead: wheels and a gyroscope of
+    /// any rate are among them.
+    pub capture: Option<Capture>,
+}
+
+/// A capture in memory.
+#[derive(Debug, Clone)]
+pub struct Capture {
+    /// As [`capture`] has it.
+    pub bytes: Vec<u8>,
+    /// The lidar that it is from.
+    pub model: &'static Model,
 }
 
 impl Log {

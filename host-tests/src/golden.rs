@@ -5,13 +5,15 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use beamfix::geometry::Pose;
+use beamfix::lidar::Model;
+use beamfix::odometry::Odometry;
 
 use crate::board::commands::Commands;
-use crate::formats::{self, Recorded, capture};
-use crate::pipeline::Pipeline;
+use crate::formats::{self, Log, capture};
+use crate::pipeline::follow;
 use crate::report::hash::PoseHash;
 use crate::shared;
-use beamfix_sim::encoder::ld06::{POINTS, Sensor};
+use beamfix_sim::encoder::ld06::Sensor;
 use beamfix_sim::{Settings, TruePose};
 
 /// A run to be repeated bit by bit.
@@ -22,7 +24,7 @@ pub struct Golden {
     pub what: &'static str,
     /// As it reaches a board.
     pub commands: Commands,
-    scans: Vec<Recorded>,
+    log: Log,
 }
 
 /// Seconds of the simulated drive.
@@ -45,34 +47,14 @@ pub fn simulated() -> Result<Golden> {
         ..Settings::DEFAULT
     };
     let drive = beamfix_sim::drive(&settings, &mut Sensor::ld06());
-    let (turns, summary) = capture::log::turns("ld06", &drive.bytes)?;
-    let frame = drive.bytes.len() / summary.packets.max(1) as usize;
-    let mut commands = Commands::new();
-    let mut scans = Vec::new();
-    let mut sent = 0;
-    for turn in turns {
-        let moment = drive
-            .moments
-            .get(turn.ends_at - 1)
-            .context("a turn ends at a beam")?;
-        let wheels: Pose = moment.wheels.into();
-        // The packet with the next turn's first beam completes this turn: the wheels come before it.
-        let before = turn.ends_at / POINTS * frame;
-        commands.lidar(&drive.bytes[sent..before]);
-        commands.wheels(wheels);
-        sent = before;
-        scans.push(Recorded {
-            stamp: moment.time.to_string(),
-            beams: turn.beams,
-            wheels: Some(wheels),
-        });
-    }
-    commands.lidar(&drive.bytes[sent..]);
+    let (bytes, ..) = capture::simulated::capture(&drive, settings.mount, &Model::LDROBOT_LD06)?;
+    let commands = Commands::of_capture(&bytes);
+    let content = formats::bytes::Content { bytes, cut: None };
     Ok(Golden {
         name: "simulated",
         what: "60 s in the simulated flat, as LD06 bytes",
         commands,
-        scans,
+        log: capture::log::parse("the simulated drive", content, "auto")?,
     })
 }
 
@@ -88,19 +70,30 @@ fn intel() -> Result<Option<Golden>> {
         name: "intel-1000",
         what: "the first 1000 scans of intel.log",
         commands: Commands::of_log(&log.scans),
-        scans: log.scans,
+        log,
     }))
 }
 
 impl Golden {
     /// Poses by the library alone, as `replay` calls it.
+    ///
+    /// # Panics
+    /// Never: nothing that could fail is done with a pose.
     #[must_use]
     pub fn poses(&self) -> Vec<Pose> {
-        let mut pipeline = Pipeline::<{ beamfix_app::BEAMS }>::new(beamfix_app::CONFIG.odometry);
-        self.scans
-            .iter()
-            .map(|scan| pipeline.step(&scan.beams, scan.wheels).pose)
-            .collect()
+        let mut poses = Vec::new();
+        let odometry = Odometry::<{ beamfix_app::BEAMS }>::new(beamfix_app::CONFIG.odometry);
+        let followed = follow(
+            &self.log,
+            (usize::MAX, true),
+            odometry,
+            &mut |_, pose, _| {
+                poses.push(pose);
+                Ok(())
+            },
+        );
+        followed.expect("a pose is kept");
+        poses
     }
 
     /// The file that keeps the bits.
@@ -225,7 +218,7 @@ mod tests {
             name: "x",
             what: "x",
             commands: Commands::new(),
-            scans: Vec::new(),
+            log: Log::default(),
         };
         assert_eq!(
             difference(&a, &parse(&golden.text(&a)).expect("just written")),

@@ -1,34 +1,230 @@
-//! The firmware's pipeline on the host: beams in, poses out, with the counts and the hash that a report needs.
+//! The library's pipeline over logs, with the counts and the hash that a report needs.
 
-use beamfix::geometry::{EgoMotion, Point, Pose, Twist};
+use anyhow::Result;
+use beamfix::geometry::{Point, Pose, Twist};
+use beamfix::lidar::Protocol;
 use beamfix::odometry::{Counters, Odometry, OdometryConfig, Step};
-use beamfix::scan::{Beam, Scan};
+use beamfix::pipeline::{Estimate, Estimator, Pipeline as Bytes, Revolution, Tracker};
+use beamfix::scan::{Beam, Mount};
 
+use crate::decode::{WithParser, with_parser};
+use crate::formats::capture::{self, Content};
+use crate::formats::{Log, Recorded};
 use crate::report::hash::PoseHash;
+
+/// What an estimator may look up between two scans (bytes): a fifth of a second of an M4F at 168 MHz.
+const BUDGET: u32 = 10_000_000;
+
+/// The odometry's settings for a lidar that sits on the robot like this, with so many directions.
+#[must_use]
+pub fn config(mount: Mount, directions: usize) -> OdometryConfig {
+    OdometryConfig {
+        directions: directions as u16,
+        ..OdometryConfig::DEFAULT.with_mount(mount)
+    }
+}
+
+/// What came of a log.
+pub struct Followed<E> {
+    /// The estimator at the end.
+    pub estimator: E,
+    /// Scans.
+    pub scans: usize,
+    /// Beams that found no room because a scan had more than N, or that were interrupted.
+    pub refused_beams: u32,
+    /// Over all poses.
+    pub hash: PoseHash,
+    /// The last pose.
+    pub last: Pose,
+}
+
+impl<E> Followed<E> {
+    /// The same with what is of interest of the estimator.
+    pub fn map<F>(self, of: impl FnOnce(E) -> F) -> Followed<F> {
+        Followed {
+            estimator: of(self.estimator),
+            scans: self.scans,
+            refused_beams: self.refused_beams,
+            hash: self.hash,
+            last: self.last,
+        }
+    }
+}
+
+/// Runs the first `scans` scans of a log through `estimator`: a capture's bytes as a board gets them, else scan by scan.
+///
+/// `sink` gets each scan, the pose (the last one again where there is none), and what the estimator says. Without
+/// `ego` wheels and gyroscope are left out.
+pub fn follow<E: Estimator<N>, const N: usize>(
+    log: &Log,
+    (scans, ego): (usize, bool),
+    estimator: E,
+    sink: &mut dyn FnMut(&Recorded, Pose, &E::Step) -> Result<()>,
+) -> Result<Followed<E>> {
+    let mut following = Following {
+        log,
+        scans,
+        ego,
+        sink,
+        number: 0,
+        hash: PoseHash::new(),
+        last: Pose::IDENTITY,
+        error: None,
+    };
+    let ended = match &log.capture {
+        Some(capture) => with_parser(
+            capture.model,
+            FromBytes {
+                bytes: &capture.bytes,
+                estimator,
+                following,
+            },
+        ),
+        None => {
+            let mut tracker = Box::new(Tracker::new(estimator));
+            following.by_scans(&mut tracker);
+            following.end(*tracker)
+        }
+    };
+    let (followed, error) = ended;
+    error.map_or(Ok(followed), Err)
+}
+
+/// A log on its way through an estimator.
+struct Following<'a, E: Estimator<N>, const N: usize> {
+    log: &'a Log,
+    scans: usize,
+    ego: bool,
+    sink: &'a mut dyn FnMut(&Recorded, Pose, &E::Step) -> Result<()>,
+    number: usize,
+    hash: PoseHash,
+    last: Pose,
+    error: Option<anyhow::Error>,
+}
+
+impl<E: Estimator<N>, const N: usize> Following<'_, E, N> {
+    fn is_done(&self) -> bool {
+        self.number >= self.scans || self.error.is_some()
+    }
+
+    fn take(&mut self, step: &E::Step) {
+        if self.is_done() {
+            return;
+        }
+        let Some(recorded) = self.log.scans.get(self.number) else {
+            return;
+        };
+        self.number += 1;
+        self.last = step.pose().unwrap_or(self.last);
+        self.hash.push(self.last);
+        self.error = (self.sink)(recorded, self.last, step).err();
+    }
+
+    fn by_scans(&mut self, tracker: &mut Tracker<E, N>) {
+        for recorded in &self.log.scans {
+            if self.is_done() {
+                return;
+            }
+            let wheels = recorded.wheels.filter(|_| self.ego);
+            push_scan(tracker, &recorded.beams, wheels, |revolution| {
+                self.take(revolution.step);
+            });
+            tracker.estimator_mut().work(BUDGET);
+        }
+    }
+
+    fn end(self, tracker: Tracker<E, N>) -> (Followed<E>, Option<anyhow::Error>) {
+        let followed = Followed {
+            refused_beams: tracker.refused_beams(),
+            estimator: tracker.into_estimator(),
+            scans: self.number,
+            hash: self.hash,
+            last: self.last,
+        };
+        (followed, self.error)
+    }
+}
+
+/// A whole scan, and the wheels at its end.
+fn push_scan<E: Estimator<N>, const N: usize>(
+    tracker: &mut Tracker<E, N>,
+    beams: &[Beam],
+    wheels: Option<Pose>,
+    ready: impl FnMut(Revolution<'_, E, N>),
+) {
+    if let (Some(wheels), Some(last)) = (wheels, beams.last()) {
+        tracker.push_wheels(last.time_us, wheels);
+    }
+    tracker.push_scan(beams.iter().copied(), ready);
+}
+
+/// A capture on its way through a lidar's parser and an estimator.
+struct FromBytes<'a, E: Estimator<N>, const N: usize> {
+    bytes: &'a [u8],
+    estimator: E,
+    following: Following<'a, E, N>,
+}
+
+impl<E: Estimator<N>, const N: usize> WithParser for FromBytes<'_, E, N> {
+    type Output = (Followed<E>, Option<anyhow::Error>);
+
+    fn run<P: Protocol>(self, parser: P) -> Self::Output {
+        let Self {
+            bytes,
+            estimator,
+            mut following,
+        } = self;
+        let mut pipeline = Box::new(Bytes::new(parser, estimator));
+        for piece in capture::pieces(bytes) {
+            if following.is_done() {
+                break;
+            }
+            let time_us = piece.time_us.map(|time_us| time_us as u32);
+            match (piece.content, time_us) {
+                (Content::Bytes(bytes), _) => {
+                    if let Some(time_us) = time_us {
+                        pipeline.set_time(time_us);
+                    }
+                    let before = following.number;
+                    pipeline.push(bytes, &mut |revolution: Revolution<'_, E, N>| {
+                        following.take(revolution.step);
+                    });
+                    if following.number > before {
+                        pipeline.tracker_mut().estimator_mut().work(BUDGET);
+                    }
+                }
+                (Content::Wheels(pose), Some(time_us)) if following.ego => {
+                    pipeline.tracker_mut().push_wheels(time_us, pose);
+                }
+                (Content::Gyro(rate), Some(time_us)) if following.ego => {
+                    pipeline.tracker_mut().push_gyro(time_us, rate);
+                }
+                _ => {}
+            }
+        }
+        pipeline.finish(&mut |revolution: Revolution<'_, E, N>| following.take(revolution.step));
+        following.end(pipeline.into_tracker())
+    }
+}
 
 /// Odometry over a sequence of scans, with its books.
 pub struct Pipeline<const N: usize> {
-    odometry: Odometry<N>,
-    scan: Scan<N>,
-    wheels: Option<Pose>,
-    /// Beams that found no room because a scan had more than N.
-    pub refused_beams: usize,
+    tracker: Tracker<Odometry<N>, N>,
     /// Over all poses so far.
     pub hash: PoseHash,
 }
 
 impl<const N: usize> Pipeline<N> {
-    /// Before the first scan. On the heap: a few scans are too much for a thread's stack in debug builds.
+    /// Before the first scan, with N directions. On the heap: a few scans are too much for a thread's stack in debug
+    /// builds.
     #[must_use]
     pub fn new(config: OdometryConfig) -> Box<Self> {
+        let config = OdometryConfig {
+            directions: N as u16,
+            ..config
+        };
         Box::new(Self {
-            odometry: Odometry::new(OdometryConfig {
-                directions: N as u16,
-                ..config
-            }),
-            scan: Scan::new(),
-            wheels: None,
-            refused_beams: 0,
+            tracker: Tracker::new(Odometry::new(config)),
             hash: PoseHash::new(),
         })
     }
@@ -36,21 +232,22 @@ impl<const N: usize> Pipeline<N> {
     /// What happened so far.
     #[must_use]
     pub fn counters(&self) -> Counters {
-        self.odometry.counters()
+        self.tracker.estimator().counters()
+    }
+
+    /// Beams that found no room because a scan had more than N.
+    #[must_use]
+    pub fn refused_beams(&self) -> u32 {
+        self.tracker.refused_beams()
     }
 
     /// Takes the next scan; `wheels` is the robot's pose by wheel odometry at its end.
     pub fn step(&mut self, beams: &[Beam], wheels: Option<Pose>) -> Step {
-        self.scan.clear();
-        for &beam in beams {
-            self.refused_beams += usize::from(self.scan.push(beam).is_err());
-        }
-        let ego = EgoMotion {
-            wheels: (self.wheels.zip(wheels)).map(|(last, now)| last.between(now)),
-            rotation: None,
-        };
-        self.wheels = wheels.filter(|pose| pose.is_finite());
-        let step = self.odometry.update(&self.scan, ego);
+        let mut step = None;
+        push_scan(&mut self.tracker, beams, wheels, |revolution| {
+            step = Some(*revolution.step);
+        });
+        let step = step.expect("a whole scan gives a step");
         self.hash.push(step.pose);
         step
     }

@@ -8,7 +8,7 @@ use beamfix_app::{
     telemetry::{Health, Quality, Ready, Telemetry},
 };
 
-use crate::formats::capture::{Content, Recorder};
+use crate::formats::capture::{Content, Recorder, telemetry};
 use crate::report::hash::PoseHash;
 use crate::report::picture::{
     colour,
@@ -45,8 +45,7 @@ pub struct Watch<W> {
     pub weak: u32,
     /// Bytes recorded.
     pub recorded: usize,
-    /// The board's clock, unwrapped (µs).
-    clock_us: Option<u64>,
+    clock: telemetry::Clock,
     path: Vec<[f64; 2]>,
     truth: Vec<[f64; 2]>,
     /// Beams of the revolution in progress, in the robot's frame.
@@ -80,7 +79,7 @@ impl<W: Write> Watch<W> {
             qualities_seen: 0,
             weak: 0,
             recorded: 0,
-            clock_us: None,
+            clock: telemetry::Clock::default(),
             path: Vec::new(),
             truth: Vec::new(),
             turn: Vec::new(),
@@ -149,14 +148,15 @@ impl<W: Write> Watch<W> {
                 self.truth
                     .push([truth.pose[0].into(), truth.pose[1].into()]);
             }
-            Telemetry::Raw(raw) => {
-                let last = self.clock_us.unwrap_or(raw.time_us.into());
-                let passed = raw.time_us.wrapping_sub(last as u32);
-                let now = last + u64::from(passed);
-                self.clock_us = Some(now);
-                self.recorded += raw.bytes.len();
-                if let Some(recorder) = &mut self.recorder {
-                    recorder.push(now, Content::Bytes(&raw.bytes))?;
+            Telemetry::Raw(_) | Telemetry::Wheels(_) | Telemetry::Gyro(_) => {
+                if let Some((time_us, content)) = telemetry::content(&message) {
+                    if let Content::Bytes(bytes) = content {
+                        self.recorded += bytes.len();
+                    }
+                    let now_us = self.clock.after(time_us);
+                    if let Some(recorder) = &mut self.recorder {
+                        recorder.push(now_us, content)?;
+                    }
                 }
             }
             Telemetry::Scan(piece) => {

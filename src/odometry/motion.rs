@@ -1,8 +1,8 @@
-//! How the robot moved while a scan was taken, told so that no error of one scan comes back in the next.
+//! Velocity of the robot during a scan, measured from the middle of one scan to the middle of the next.
 //!
-//! A scan bent back by a twist that is off by δ is matched with its end δ·T/2 off, T being its duration, but with its
-//! middle in place to first order. So motion is measured from middle to middle: from end to end, half of each error
-//! would return with the other sign, scan after scan.
+//! A scan that is deskewed with a velocity off by δ is matched with its end δ·T/2 off, T being its duration, but with its
+//! middle in place to first order. Measured from end to end, half of each error would return with the other sign, scan
+//! after scan.
 
 use crate::{
     geometry::{Pose, Twist},
@@ -12,9 +12,9 @@ use crate::{
 /// When a scan was taken.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Times {
-    /// From the last scan's end to its own (s).
+    /// Time from the last scan's end to this one's (s).
     pub seconds: f32,
-    /// From its first beam to its last (s).
+    /// Time from the scan's first beam to its last (s).
     pub duration: f32,
 }
 
@@ -23,14 +23,14 @@ pub(super) struct Times {
 pub(super) struct Motion {
     /// Velocity during the last scan.
     pub twist: Twist,
-    /// The robot in its middle.
+    /// Robot in the middle of the last scan.
     middle: Pose,
-    /// Velocity during it by the wheels; zero without them.
-    rolling: Twist,
-    /// From its first beam to its last (s).
+    /// Velocity during the last scan by the wheels; zero without them.
+    wheel_twist: Twist,
+    /// Time from the last scan's first beam to its last (s).
     duration: f32,
-    /// From scan to scan, about (s).
-    usual: f32,
+    /// Running mean of the time from scan to scan (s).
+    mean_interval: f32,
 }
 
 impl Motion {
@@ -38,31 +38,31 @@ impl Motion {
     pub const STANDING: Self = Self {
         twist: Twist::ZERO,
         middle: Pose::IDENTITY,
-        rolling: Twist::ZERO,
+        wheel_twist: Twist::ZERO,
         duration: 0.0,
-        usual: 0.0,
+        mean_interval: 0.0,
     };
 
-    /// Velocity during a scan whose middle was found at `middle`: that of the wheels and of what they missed on the
-    /// way from the last scan's middle. Without wheels they missed all of it.
-    pub fn during(&self, middle: Pose, rolling: Option<Twist>, times: Times) -> Twist {
-        /// Less is the noise of two matches (m, rad): wheels know better.
+    /// Velocity during a scan whose middle was found at `middle`: wheel velocity plus the correction that the last two
+    /// matches imply. Without wheels the whole velocity comes from the matches.
+    pub fn during(&self, middle: Pose, wheels: Option<Twist>, times: Times) -> Twist {
+        /// A smaller correction (m, rad) is the noise of two matches: wheels know better.
         const SLIP: (f32, f32) = (0.01, 0.006);
         if times.seconds <= 0.0 {
             // Over a gap of unknown length there is no velocity.
             return Twist::ZERO;
         }
         let between = times.seconds + 0.5 * (self.duration - times.duration);
-        let by_wheels = rolling.unwrap_or(Twist::ZERO);
-        let rolled = self.rolling.displacement(0.5 * self.duration)
+        let by_wheels = wheels.unwrap_or(Twist::ZERO);
+        let wheel_motion = self.wheel_twist.displacement(0.5 * self.duration)
             * by_wheels.displacement(times.seconds - 0.5 * times.duration);
-        let missed = rolled.between(self.middle.between(middle));
-        if rolling.is_some() && missed.distance() < SLIP.0 && math::abs(missed.theta) < SLIP.1 {
+        let missed = wheel_motion.between(self.middle.between(middle));
+        if wheels.is_some() && missed.distance() < SLIP.0 && math::abs(missed.theta) < SLIP.1 {
             return by_wheels;
         }
-        // A clock whose moments jump makes a velocity of any size. That of wheels says how far within the same time.
-        let least = 0.5 * self.usual;
-        let between = if rolling.is_none() && between < least {
+        // A clock whose moments jump makes a velocity of any size. The wheels' correction is of the same interval.
+        let least = 0.5 * self.mean_interval;
+        let between = if wheels.is_none() && between < least {
             least
         } else {
             between
@@ -75,12 +75,12 @@ impl Motion {
         }
     }
 
-    /// A scan was taken that ended at `end` and during which the robot moved with `twist`.
-    pub fn advance(&mut self, end: Pose, twist: Twist, rolling: Option<Twist>, times: Times) {
+    /// Takes a scan that ended at `end` and during which the robot moved with `twist`.
+    pub fn advance(&mut self, end: Pose, twist: Twist, wheels: Option<Twist>, times: Times) {
         self.middle = end * twist.displacement(-0.5 * times.duration);
-        self.rolling = rolling.unwrap_or(Twist::ZERO);
+        self.wheel_twist = wheels.unwrap_or(Twist::ZERO);
         self.duration = times.duration;
-        self.usual += 0.1 * (times.seconds - self.usual);
+        self.mean_interval += 0.1 * (times.seconds - self.mean_interval);
         self.twist = twist;
     }
 }
@@ -98,7 +98,7 @@ mod tests {
         Twist { vx, vy: 0.0, omega }
     }
 
-    /// Scans of a robot that drives with `truth`, their middles found `errors` (rad) off; velocity told at the end.
+    /// Scans of a robot that drives with `truth`, their middles found `errors` (rad) off; velocity found at the end.
     fn told(truth: Twist, wheels: Option<Twist>, errors: &[f32]) -> Twist {
         let mut motion = Motion::STANDING;
         let mut end = Pose::IDENTITY;

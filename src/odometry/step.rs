@@ -22,9 +22,10 @@ pub struct Step {
 }
 
 /// Why a scan gave no pose of its own.
+///
+/// Exhaustive: telemetry names every reason, and a new one must not go unnamed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 pub enum Refusal {
     /// The first scan: there was nothing to match against.
     First,

@@ -77,6 +77,12 @@ impl<E, const N: usize> Tracker<E, N> {
         &mut self.estimator
     }
 
+    /// The estimator alone, at the end.
+    #[must_use]
+    pub fn into_estimator(self) -> E {
+        self.estimator
+    }
+
     /// Beams that found no room because a revolution had more than N, and the beams of interrupted revolutions; wraps.
     pub fn refused_beams(&self) -> u32 {
         self.assembler.refused_beams()

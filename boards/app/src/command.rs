@@ -11,7 +11,8 @@ pub const LIDAR: usize = 94;
 /// A message to the board. What is long stays where it was received: there is no room for it on a small stack.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Command<'a> {
-    /// The robot's pose by its wheels, in a frame of their own; counts for the revolution that ends next.
+    /// The robot's pose by its wheels, in a frame of their own, when the message comes in. Any rate from two a second on
+    /// will do.
     Wheels {
         /// Forward (m).
         x: f32,
@@ -33,12 +34,17 @@ pub enum Command<'a> {
     Health,
     /// Switches what is sent besides poses and health.
     Send {
-        /// The lidar's bytes with their times.
+        /// The lidar's bytes, wheels and gyroscope with their times.
         raw: bool,
         /// Every beam.
         scans: bool,
         /// How good each match was.
         quality: bool,
+    },
+    /// The robot's rate of turn by a gyroscope when the message comes in: 20 times a second or more.
+    Gyro {
+        /// Counter-clockwise (rad/s).
+        rate: f32,
     },
 }
 

@@ -197,9 +197,7 @@ impl FirstPoses {
         let mut hash = 0xcbf2_9ce4_8422_2325;
         let mut seen = 0;
         while seen < self.count {
-            for byte in demo.packet() {
-                let _ = app.lidar(byte);
-            }
+            app.lidar_all(&demo.packet(), |_| ());
             if app.seen().turns != seen {
                 seen = app.seen().turns;
                 let Pose { x, y, theta } = app.pose();

@@ -1,8 +1,8 @@
 //! The firmware of every board, without the board: bytes in, frames out.
 //!
 //! ```text
-//! lidar(byte) ───▶ ld06 ─▶ assembler ─▶ odometry ─▶ pose, health ─▶ bytes to send
-//! command(byte) ─▶ wheels, beams of other sensors
+//! lidar(bytes) ───▶ pipeline ─▶ pose, health ─▶ bytes to send
+//! command(bytes) ─▶ wheels, gyroscope, beams of other sensors
 //! ```
 //!
 //! [`App`] does no I/O, so the host runs the very code that the boards run; a board moves bytes between its UARTs
@@ -25,27 +25,28 @@ pub mod telemetry;
 pub mod text;
 
 use beamfix::{
-    geometry::{EgoMotion, Pose},
+    geometry::Pose,
     lidar::{Packet as _, Protocol as _, ld06, motor::MotorConfig},
     odometry::{Odometry, OdometryConfig, Step},
-    scan::{Assembler, Beam},
+    pipeline::{Pipeline, Revolution, Sink},
 };
 use heapless::Vec;
 
 use command::Command;
 use supervisor::{Care, Seen};
-use telemetry::{Health, Piece, Quality, Raw, Ready, Reset, Telemetry, Verdict};
+use telemetry::{Gyro, Health, Piece, Quality, Raw, Ready, Reset, Telemetry, Verdict, Wheels};
 
 /// Version of [`telemetry`] and [`command`].
-pub const VERSION: u8 = 3;
+pub const VERSION: u8 = 4;
 /// What the lidar sends at.
 pub const LIDAR_BAUD: u32 = 230_400;
 /// What frames leave at and commands come in at: a recording with everything switched on takes half of it.
 pub const TELEMETRY_BAUD: u32 = 921_600;
 /// Revolutions between two health messages.
 const HEALTH_EVERY: u16 = 16;
-/// Longest time that bytes of the lidar wait for others before they are sent on (µs).
-const RAW_US: u32 = 20_000;
+/// Bytes of the lidar that come in within this time of each other count as coming in together (µs), so that a recording
+/// can say when that was.
+const PIECE_US: u32 = 2_000;
 
 /// Most beams of a revolution; further ones are refused and counted. An LD06 sends 450 at 10 Hz.
 pub const BEAMS: usize = 456;
@@ -66,7 +67,7 @@ pub struct AppConfig {
     pub odometry: OdometryConfig,
     /// What is sent. Default: frames.
     pub output: Output,
-    /// Whether the lidar's bytes are sent on with their times, for a replay on a PC. Default: no; a command switches it.
+    /// Whether the lidar's bytes, wheels and gyroscope are sent on with their times, for a replay on a PC. Default: no; a command switches it.
     pub record: bool,
     /// Whether every beam is sent on, for a picture on a PC. Default: no; a command switches it.
     pub scans: bool,
@@ -121,35 +122,23 @@ pub enum Output {
 }
 
 /// Most bytes that one call gives.
-const OUT: usize = if cfg!(feature = "mavlink") { 448 } else { 256 };
+///
+/// A packet makes a pose, its quality and a piece of the scan at most; health waits for room.
+const OUT: usize = if cfg!(feature = "mavlink") { 448 } else { 192 };
 
 /// What a board runs. N is the most beams a revolution may have.
 pub struct App<const N: usize> {
-    lidar: Lidar,
+    pipeline: Pipeline<ld06::Parser, Odometry<N>, N>,
     commands: link::Receiver,
-    turns: Turns<N>,
-    raw: Raw,
+    /// The bytes of the lidar that came in last, together, and when.
+    piece: Raw,
+    /// Bytes of the lidar taken; wraps.
+    lidar_bytes: u32,
+    report: Report,
 }
 
-/// From bytes to beams.
-struct Lidar {
-    parser: ld06::Parser,
-    /// Here rather than on the stack, where it would lie below a match.
-    packet: Option<ld06::Packet>,
-    /// Bytes taken; wraps.
-    bytes: u32,
-    /// The motor's speed by the last good packet.
-    speed_deg_per_s: u16,
-}
-
-/// From beams to frames.
-struct Turns<const N: usize> {
-    assembler: Assembler<N>,
-    odometry: Odometry<N>,
-    /// Where the robot is by its wheels, until a revolution has used it.
-    wheels: Option<Pose>,
-    /// The same at the end of the last revolution.
-    last_wheels: Option<Pose>,
+/// From steps to bytes to send.
+struct Report {
     output: Output,
     record: bool,
     scans: bool,
@@ -158,6 +147,8 @@ struct Turns<const N: usize> {
     /// When the last pose was, until its error was told.
     #[cfg(feature = "demo")]
     pose_us: Option<u32>,
+    /// The motor's speed by the last good packet.
+    speed_deg_per_s: u16,
     sequence: u16,
     bytes_lost: u32,
     care: Care,
@@ -170,18 +161,14 @@ impl<const N: usize> App<N> {
     #[must_use]
     pub const fn new(config: AppConfig) -> Self {
         Self {
-            lidar: Lidar {
-                parser: ld06::Parser::new(),
-                packet: None,
-                bytes: 0,
-                speed_deg_per_s: 0,
-            },
+            pipeline: Pipeline::new(ld06::Parser::new(), Odometry::new(config.odometry)),
             commands: link::Receiver::new(),
-            turns: Turns {
-                assembler: Assembler::new(),
-                odometry: Odometry::new(config.odometry),
-                wheels: None,
-                last_wheels: None,
+            piece: Raw {
+                time_us: 0,
+                bytes: Vec::new(),
+            },
+            lidar_bytes: 0,
+            report: Report {
                 output: config.output,
                 record: config.record,
                 scans: config.scans,
@@ -189,221 +176,260 @@ impl<const N: usize> App<N> {
                 now_us: 0,
                 #[cfg(feature = "demo")]
                 pose_us: None,
+                speed_deg_per_s: 0,
                 sequence: 0,
                 health_due: false,
                 bytes_lost: 0,
                 care: Care::NONE,
                 out: Vec::new(),
             },
-            raw: Raw {
-                time_us: 0,
-                bytes: Vec::new(),
-            },
         }
     }
 
     /// The frame to send once the board listens.
     pub fn ready(&mut self, reset: Reset) -> &[u8] {
-        self.turns.out.clear();
+        self.report.out.clear();
         let ready = Ready {
             version: VERSION,
             beams: N as u16,
             reset,
         };
-        self.turns.send(&Telemetry::Ready(ready));
-        &self.turns.out
+        self.report.send(&Telemetry::Ready(ready));
+        &self.report.out
     }
 
-    /// How far the last pose is from where the simulated robot really is; most often nothing, for nothing was found.
+    /// Bytes that report the error of the last pose; empty if there was no new pose.
     #[cfg(feature = "demo")]
     pub fn truth(&mut self, demo: &mut demo::Demo) -> &[u8] {
-        self.turns.out.clear();
-        if let Some(at) = self.turns.pose_us.take() {
-            self.turns.tell_truth(demo.truth(at));
+        self.report.out.clear();
+        if let Some(at) = self.report.pose_us.take() {
+            self.report.send_truth(demo.truth(at), self.pose());
         }
-        &self.turns.out
+        &self.report.out
     }
 
-    /// Tells the time (µs, wrapping), which only recordings and MAVLink need.
+    /// Says when the bytes given next came in (µs, wrapping).
     pub fn set_time(&mut self, now_us: u32) {
-        self.turns.now_us = now_us;
+        self.report.now_us = now_us;
     }
 
-    /// Takes a byte of the lidar; gives the bytes to send, most often none.
+    /// Takes bytes of the lidar until there is something to send: gives the number of bytes taken and what to send,
+    /// most often nothing. The rest of the bytes is to be given again.
     ///
     /// The byte that completes a revolution costs a match; a board must buffer what comes meanwhile.
-    pub fn lidar(&mut self, byte: u8) -> &[u8] {
-        self.turns.out.clear();
-        if self.turns.record {
-            self.record(byte);
+    pub fn lidar(&mut self, bytes: &[u8]) -> (usize, &[u8]) {
+        self.report.out.clear();
+        let mut taken = 0;
+        while let Some(rest) = bytes.get(taken..).filter(|rest| !rest.is_empty()) {
+            let room = self.room_in_piece();
+            if !self.report.out.is_empty() {
+                break;
+            }
+            let part = rest.get(..room).unwrap_or(rest);
+            let count = self.pipeline.push_packet(part, &mut self.report);
+            let _ = (self.piece.bytes).extend_from_slice(part.get(..count).unwrap_or_default());
+            taken += count;
+            if !self.report.out.is_empty() {
+                break;
+            }
         }
-        self.lidar.push(byte, &mut self.turns);
-        self.health_when_due()
+        self.lidar_bytes = self.lidar_bytes.wrapping_add(taken as u32);
+        (taken, self.health_when_due())
     }
 
-    /// Collects the lidar's bytes and sends them on in pieces.
+    /// Takes all of some bytes of the lidar; what is to be sent goes to `send`.
+    pub fn lidar_all(&mut self, bytes: &[u8], mut send: impl FnMut(&[u8])) {
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let (taken, sent) = self.lidar(rest);
+            send(sent);
+            rest = rest.get(taken..).unwrap_or_default();
+        }
+    }
+
+    /// Room for bytes that come in now, in the piece that came in together or in a new one: this sets the pipeline's
+    /// clock, so that a recording of the pieces gives the same poses again.
     #[inline(never)]
-    fn record(&mut self, byte: u8) {
-        let now_us = self.turns.now_us;
-        let waited_us = now_us.wrapping_sub(self.raw.time_us);
-        let old = !self.raw.bytes.is_empty() && waited_us > RAW_US;
-        if self.raw.bytes.is_full() || old {
-            self.turns.send_raw(&self.raw);
-            self.raw.bytes.clear();
+    fn room_in_piece(&mut self) -> usize {
+        let now_us = self.report.now_us;
+        let waited_us = now_us.wrapping_sub(self.piece.time_us);
+        if self.piece.bytes.is_full() || self.piece.bytes.is_empty() || waited_us > PIECE_US {
+            self.end_piece();
         }
-        if self.raw.bytes.is_empty() {
-            self.raw.time_us = now_us;
-        }
-        let _ = self.raw.bytes.push(byte);
+        self.piece.bytes.capacity() - self.piece.bytes.len()
     }
 
-    /// Takes a byte of the command line; gives the bytes to send, most often none.
-    pub fn command(&mut self, byte: u8) -> &[u8] {
-        self.turns.out.clear();
+    /// Sends the bytes that came in together, if they are recorded; what comes in from now on belongs to a new piece.
+    #[inline(never)]
+    fn end_piece(&mut self) {
+        if self.report.record && !self.piece.bytes.is_empty() {
+            self.report.send_raw(&self.piece);
+        }
+        self.piece.bytes.clear();
+        self.piece.time_us = self.report.now_us;
+        self.pipeline.set_time(self.report.now_us);
+    }
+
+    /// Takes bytes of the command line until there is something to send: gives the number of bytes taken, and what to
+    /// send, as [`App::lidar`] does.
+    pub fn command(&mut self, bytes: &[u8]) -> (usize, &[u8]) {
+        self.report.out.clear();
+        let mut taken = 0;
+        while let Some(&byte) = bytes.get(taken) {
+            taken += 1;
+            if self.take_command(byte) && (!self.report.out.is_empty() || self.report.health_due) {
+                break;
+            }
+        }
+        (taken, self.health_when_due())
+    }
+
+    /// Takes all of some bytes of the command line; what is to be sent goes to `send`.
+    pub fn command_all(&mut self, bytes: &[u8], mut send: impl FnMut(&[u8])) {
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let (taken, sent) = self.command(rest);
+            send(sent);
+            rest = rest.get(taken..).unwrap_or_default();
+        }
+    }
+
+    /// Takes a byte of the command line; whether it completed a command.
+    fn take_command(&mut self, byte: u8) -> bool {
+        let now_us = self.report.now_us;
         match self.commands.push(byte) {
-            None => return &[],
+            None => return false,
             Some(Command::Wheels { x, y, theta }) => {
-                self.turns.wheels = Some(Pose::new(x, y, theta));
+                self.end_piece();
+                let pose = Pose::new(x, y, theta);
+                self.pipeline.tracker_mut().push_wheels(now_us, pose);
+                self.report.send_wheels([x, y, theta]);
+            }
+            Some(Command::Gyro { rate }) => {
+                self.end_piece();
+                self.pipeline.tracker_mut().push_gyro(now_us, rate);
+                self.report.send_gyro(rate);
             }
             Some(Command::Lidar(bytes)) => {
-                for &byte in bytes {
-                    self.lidar.push(byte, &mut self.turns);
-                }
+                self.lidar_bytes = self.lidar_bytes.wrapping_add(bytes.len() as u32);
+                self.pipeline.set_time(now_us);
+                self.pipeline.push(bytes, &mut self.report);
             }
             Some(Command::Beams { turn_starts, beams }) => {
-                for (k, beam) in command::beams(beams).enumerate() {
-                    self.turns.beam(beam, turn_starts && k == 0);
-                }
+                let tracker = self.pipeline.tracker_mut();
+                tracker.set_time(now_us);
+                let start = turn_starts.then_some(0);
+                let report = &mut self.report;
+                tracker.push_packet(command::beams(beams), start, |revolution| {
+                    report.step(&revolution);
+                });
             }
             Some(Command::Health) => {
                 // What is left of a recording comes too.
-                if !self.raw.bytes.is_empty() {
-                    self.turns.send_raw(&self.raw);
-                    self.raw.bytes.clear();
-                }
-                self.turns.health_due = true;
+                self.end_piece();
+                self.report.health_due = true;
             }
             Some(Command::Send {
                 raw,
                 scans,
                 quality,
             }) => {
-                self.turns.record = raw;
-                self.turns.scans = scans;
-                self.turns.quality = quality;
+                self.end_piece();
+                self.report.record = raw;
+                self.report.scans = scans;
+                self.report.quality = quality;
             }
         }
-        self.health_when_due()
+        true
     }
 
     /// Where the robot is.
     #[must_use]
     pub fn pose(&self) -> Pose {
-        self.turns.odometry.pose()
+        self.odometry().pose()
+    }
+
+    fn odometry(&self) -> &Odometry<N> {
+        self.pipeline.tracker().estimator()
     }
 
     /// What a [`supervisor::Supervisor`] watches.
     #[must_use]
     pub fn seen(&self) -> Seen {
         Seen {
-            bytes: self.lidar.bytes,
-            packets: self.lidar.parser.counters().packets,
-            turns: self.turns.odometry.counters().scans,
-            speed_deg_per_s: self.lidar.speed_deg_per_s,
+            bytes: self.lidar_bytes,
+            packets: self.pipeline.lidar().counters().packets,
+            turns: self.odometry().counters().scans,
+            speed_deg_per_s: self.report.speed_deg_per_s,
         }
     }
 
     /// Tells what a [`supervisor::Supervisor`] found.
     pub fn set_care(&mut self, care: Care) {
-        self.turns.care = care;
+        self.report.care = care;
     }
 
     /// Tells how many bytes found no room in the board's buffers since the start.
     pub fn set_bytes_lost(&mut self, bytes: u32) {
-        self.turns.bytes_lost = bytes;
+        self.report.bytes_lost = bytes;
     }
 
     fn health_when_due(&mut self) -> &[u8] {
         // It waits for a call that has room for it.
-        let room = self.turns.out.capacity() - self.turns.out.len();
-        if self.turns.health_due && room >= telemetry::HEALTH_FRAME {
-            self.turns.health_due = false;
+        let room = self.report.out.capacity() - self.report.out.len();
+        if self.report.health_due && room >= telemetry::HEALTH_FRAME {
+            self.report.health_due = false;
             let health = self.health();
-            self.turns.send(&Telemetry::Health(health));
+            self.report.send(&Telemetry::Health(health));
         }
-        &self.turns.out
+        &self.report.out
     }
 
     /// How the parts are.
     #[must_use]
     pub fn health(&self) -> Health {
-        let lidar = self.lidar.parser.counters();
+        let lidar = self.pipeline.lidar().counters();
         let commands = self.commands.counters();
         Health {
             packets: lidar.packets,
             check_errors: lidar.check_errors,
             skipped_bytes: lidar.skipped_bytes,
-            beams_refused: self.turns.assembler.refused_beams(),
-            matches_refused: self.turns.odometry.counters().refused,
+            beams_refused: self.pipeline.tracker().refused_beams(),
+            matches_refused: self.odometry().counters().refused,
             commands: commands.frames,
             command_errors: commands.errors,
-            bytes_lost: self.turns.bytes_lost,
-            lidar: self.turns.care.lidar,
-            motor: self.turns.care.motor,
-            motor_restarts: self.turns.care.motor_restarts,
+            bytes_lost: self.report.bytes_lost,
+            lidar: self.report.care.lidar,
+            motor: self.report.care.motor,
+            motor_restarts: self.report.care.motor_restarts,
         }
     }
 }
 
-impl Lidar {
-    /// Apart, so that what the parser needs is not on the stack during a match.
-    #[inline(never)]
-    fn receive(&mut self, byte: u8) {
-        self.packet = self.parser.push(byte);
+impl<const N: usize> Sink<ld06::Packet, Odometry<N>, N> for Report {
+    fn revolution(&mut self, revolution: Revolution<'_, Odometry<N>, N>) {
+        self.step(&revolution);
     }
 
-    fn push<const N: usize>(&mut self, byte: u8, turns: &mut Turns<N>) {
-        self.bytes = self.bytes.wrapping_add(1);
-        self.receive(byte);
-        if let Some(packet) = &self.packet {
-            self.speed_deg_per_s = packet.speed_deg_per_s;
-            let start = packet.revolution_start();
-            for (k, beam) in packet.beams().enumerate() {
-                turns.beam(beam, start == Some(k));
-            }
-            if turns.scans {
-                turns.send_piece(packet, start);
-            }
+    fn packet(&mut self, packet: &ld06::Packet) {
+        self.speed_deg_per_s = packet.speed_deg_per_s;
+        if self.scans {
+            self.send_piece(packet);
         }
     }
 }
 
-impl<const N: usize> Turns<N> {
-    fn beam(&mut self, beam: Beam, turn_starts: bool) {
-        if !self.assembler.push(beam, turn_starts) {
-            return;
-        }
-        let scan = self.assembler.scan();
-        let time_us = scan.end_us();
-        let wheels = self.wheels.take();
-        let ego = EgoMotion {
-            wheels: (self.last_wheels.zip(wheels)).map(|(last, now)| last.between(now)),
-            rotation: None,
-        };
-        self.last_wheels = wheels.filter(|pose| pose.is_finite());
-        let step = self.odometry.update(scan, ego);
-        self.report(time_us, &step);
-    }
-
+impl Report {
     /// Apart, so that its memory is not on the stack during the match.
     #[inline(never)]
-    fn report(&mut self, time_us: u32, step: &Step) {
-        let pose = frame(self.sequence, time_us, step);
+    fn step<const N: usize>(&mut self, revolution: &Revolution<'_, Odometry<N>, N>) {
+        let time_us = revolution.scan.end_us();
+        let pose = frame(self.sequence, time_us, revolution.step);
         self.sequence = self.sequence.wrapping_add(1);
         self.health_due |= self.sequence.is_multiple_of(HEALTH_EVERY);
         self.send(&Telemetry::Pose(pose));
         if self.quality {
-            self.send_quality(pose.sequence, step);
+            self.send_quality(pose.sequence, revolution.step);
         }
         #[cfg(feature = "demo")]
         {
@@ -411,9 +437,8 @@ impl<const N: usize> Turns<N> {
         }
         #[cfg(feature = "mavlink")]
         if self.output == Output::Mavlink {
-            let twist = self.odometry.twist();
-            let scan = self.assembler.scan();
-            mavlink::append(&pose, twist, scan, self.now_us, &mut self.out);
+            let twist = revolution.estimator.twist();
+            mavlink::append(&pose, twist, revolution.scan, self.now_us, &mut self.out);
         }
     }
 
@@ -422,19 +447,38 @@ impl<const N: usize> Turns<N> {
         self.send(&Telemetry::Raw(raw.clone()));
     }
 
+    /// Sends a pose of the wheels back with its time, where a recording wants it.
+    #[inline(never)]
+    fn send_wheels(&mut self, pose: [f32; 3]) {
+        if self.record {
+            let time_us = self.now_us;
+            self.send(&Telemetry::Wheels(Wheels { time_us, pose }));
+        }
+    }
+
+    /// Sends a rate of the gyroscope back with its time, where a recording wants it.
+    #[inline(never)]
+    fn send_gyro(&mut self, rate: f32) {
+        if self.record {
+            let time_us = self.now_us;
+            self.send(&Telemetry::Gyro(Gyro { time_us, rate }));
+        }
+    }
+
     #[inline(never)]
     fn send_quality(&mut self, sequence: u16, step: &Step) {
         self.send(&Telemetry::Quality(Quality::of(sequence, step)));
     }
 
     #[inline(never)]
-    fn send_piece(&mut self, packet: &ld06::Packet, start: Option<usize>) {
+    fn send_piece(&mut self, packet: &ld06::Packet) {
+        let start = packet.revolution_start();
         self.send(&Telemetry::Scan(Piece::of(packet, start)));
     }
 
     #[cfg(feature = "demo")]
     #[inline(never)]
-    fn tell_truth(&mut self, truth: Pose) {
+    fn send_truth(&mut self, truth: Pose, pose: Pose) {
         let sequence = self.sequence.wrapping_sub(1);
         let message = telemetry::Truth {
             sequence,
@@ -442,7 +486,7 @@ impl<const N: usize> Turns<N> {
         };
         self.send(&Telemetry::Truth(message));
         if self.output == Output::Text {
-            let off = truth.between(self.odometry.pose());
+            let off = truth.between(pose);
             text::append_error(
                 1000.0 * off.distance(),
                 off.theta.to_degrees(),
@@ -466,7 +510,6 @@ impl<const N: usize> Turns<N> {
 
 /// A step as it is sent.
 fn frame(sequence: u16, time_us: u32, step: &Step) -> telemetry::Pose {
-    let c = step.covariance.0;
     let (inliers, beams, residual) = match &step.outcome {
         Ok(found) => (found.inliers, found.beams, found.residual),
         Err(_) => (0, 0, 0.0),
@@ -475,7 +518,7 @@ fn frame(sequence: u16, time_us: u32, step: &Step) -> telemetry::Pose {
         sequence,
         time_us,
         pose: [step.pose.x, step.pose.y, step.pose.theta],
-        covariance: [c.xx, c.xy, c.yy, c.xt, c.yt, c.tt],
+        covariance: step.covariance.to_array(),
         verdict: Verdict::of(step),
         inliers,
         beams,

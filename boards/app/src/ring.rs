@@ -38,9 +38,20 @@ impl<const B: usize> Ring<B> {
         self.with(|ring| ring.lost = ring.lost.wrapping_add(bytes));
     }
 
-    /// The oldest byte.
-    pub fn pop(&self) -> Option<u8> {
-        self.with(|ring| ring.bytes.pop_front())?
+    /// Moves the oldest bytes to `to`, as many as there are and have room there; gives their number.
+    pub fn read(&self, to: &mut [u8]) -> usize {
+        let read = |ring: &mut Inner<B>| {
+            let mut count = 0;
+            for (slot, byte) in to
+                .iter_mut()
+                .zip(core::iter::from_fn(|| ring.bytes.pop_front()))
+            {
+                *slot = byte;
+                count += 1;
+            }
+            count
+        };
+        self.with(read).unwrap_or(0)
     }
 
     /// Whether there is none.

@@ -9,6 +9,9 @@ use crate::{
     telemetry::Reset,
 };
 
+/// Most bytes that are taken from a ring at a time: what an LD06 sends in 1.4 ms.
+const PIECE: usize = 32;
+
 /// What the loop needs of a board besides its interrupts, which fill the two rings.
 pub trait Hardware {
     /// Why the board has started.
@@ -61,12 +64,12 @@ pub fn run<const N: usize, const L: usize, const C: usize>(
                 hardware.feed_watchdog();
             }
         }
-        let sent = if let Some(byte) = commands.pop() {
-            app.command(byte)
-        } else if let Some(byte) = lidar.pop() {
-            app.set_bytes_lost(lidar.lost());
-            app.lidar(byte)
-        } else {
+        let mut bytes = [0; PIECE];
+        let (count, is_lidar) = match commands.read(&mut bytes) {
+            0 => (lidar.read(&mut bytes), true),
+            count => (count, false),
+        };
+        if count == 0 {
             // Looked at once more with interrupts masked: a byte that came just now would not wake the sleeper.
             // A masked interrupt that is pending does.
             critical_section::with(|_| {
@@ -75,12 +78,22 @@ pub fn run<const N: usize, const L: usize, const C: usize>(
                 }
             });
             continue;
-        };
-        if !sent.is_empty() {
-            hardware.send(sent);
-            hardware.log(app.pose());
-            #[cfg(feature = "demo")]
-            hardware.send(app.truth(&mut demo));
+        }
+        app.set_bytes_lost(lidar.lost());
+        let mut rest = bytes.get(..count).unwrap_or_default();
+        while !rest.is_empty() {
+            let (taken, sent) = if is_lidar {
+                app.lidar(rest)
+            } else {
+                app.command(rest)
+            };
+            rest = rest.get(taken..).unwrap_or_default();
+            if !sent.is_empty() {
+                hardware.send(sent);
+                hardware.log(app.pose());
+                #[cfg(feature = "demo")]
+                hardware.send(app.truth(&mut demo));
+            }
         }
     }
 }

@@ -25,7 +25,7 @@ pub enum Telemetry {
     Ready(Ready),
     /// After every revolution.
     Pose(Pose),
-    /// After every 16th revolution, and by itself where nothing else is left to say.
+    /// After every 16th revolution, and on request.
     Health(Health),
     /// What the last pose cost: only from a board that counts instructions.
     Cost(Cost),
@@ -37,6 +37,10 @@ pub enum Telemetry {
     Truth(Truth),
     /// How good the match behind the last pose was, where it is asked for.
     Quality(Quality),
+    /// A pose of the wheels as it came in, where a recording is asked for.
+    Wheels(Wheels),
+    /// A rate of the gyroscope as it came in, where a recording is asked for.
+    Gyro(Gyro),
 }
 
 /// The firmware listens.
@@ -70,7 +74,8 @@ pub struct Pose {
     pub time_us: u32,
     /// Forward, left (m) and heading (rad) since the start.
     pub pose: [f32; 3],
-    /// Covariance of one match: xx, xy, yy (m²), xθ, yθ (m·rad), θθ (rad²).
+    /// Covariance of `pose` since the start, growing with the way, in the frame of `pose`: xx, xy, yy (m²), xθ, yθ
+    /// (m·rad), θθ (rad²).
     pub covariance: [f32; 6],
     /// What became of the match.
     pub verdict: Verdict,
@@ -105,8 +110,16 @@ pub enum Verdict {
     Ambiguous,
     /// The match is too far from the prediction to be believed.
     TooFar,
-    /// For a reason that this version does not name.
+    /// For a reason that a version before 4 did not name.
     Refused,
+    /// No pose that was tried reaches the least score.
+    NothingFound,
+    /// The best pose explains the revolution badly.
+    Unlikely,
+    /// The prediction is not a number, or farther away than the matcher can reckon.
+    BadGuess,
+    /// A setting is out of its range.
+    BadConfig,
 }
 
 impl Verdict {
@@ -125,9 +138,11 @@ impl Verdict {
                 MatchError::Degenerate => Self::Degenerate,
                 MatchError::NotConverged { .. } => Self::NotConverged,
                 MatchError::Ambiguous { .. } => Self::Ambiguous,
-                _ => Self::Refused,
+                MatchError::NothingFound { .. } => Self::NothingFound,
+                MatchError::Unlikely { .. } => Self::Unlikely,
+                MatchError::BadGuess => Self::BadGuess,
+                MatchError::BadConfig(_) => Self::BadConfig,
             },
-            Err(_) => Self::Refused,
         }
     }
 }
@@ -171,10 +186,13 @@ pub struct Found {
 /// A direction along which the pose is hardly measured, as along a corridor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Weak {
-    /// Unit vector over forward, left and heading · lever, in the keyframe's frame.
+    /// Unit vector over forward, left and heading · `lever`, in the keyframe's frame.
     pub direction: [f32; 3],
     /// Standard deviation along it by the scan alone (m).
     pub sigma: f32,
+    /// Distance that makes a heading comparable with a position (m): a motion of `d` metres along the direction turns by
+    /// `d · direction[2] / lever` radians.
+    pub lever: f32,
 }
 
 impl Quality {
@@ -194,17 +212,17 @@ impl Quality {
 
 impl Found {
     fn of(found: &Match) -> Self {
-        let c = found.covariance.0;
         Self {
             score: found.score,
             inliers: found.inliers,
             overlap: found.overlap,
             beams: found.beams,
             residual: found.residual,
-            covariance: [c.xx, c.xy, c.yy, c.xt, c.yt, c.tt],
+            covariance: found.covariance.to_array(),
             weak: found.degenerate_direction.map(|weak| Weak {
                 direction: weak.direction,
                 sigma: weak.sigma,
+                lever: weak.lever,
             }),
             iterations: found.iterations,
             starts: found.starts.map_or(1, |starts| starts.tried),
@@ -227,7 +245,11 @@ fn numbers(refusal: &Refusal) -> [f32; 2] {
             | MatchError::NotConverged { step: one }
             | MatchError::Ambiguous { ratio: one },
         ) => [*one, 0.0],
-        _ => [0.0; 2],
+        Refusal::NoMatch(MatchError::NothingFound { min_score }) => [0.0, *min_score],
+        Refusal::First
+        | Refusal::NoMatch(
+            MatchError::BadGuess | MatchError::BadConfig(_) | MatchError::Degenerate,
+        ) => [0.0; 2],
     }
 }
 
@@ -295,6 +317,24 @@ pub struct Raw {
     pub time_us: u32,
     /// What came.
     pub bytes: Vec<u8, RAW>,
+}
+
+/// A pose of the wheels as it came in.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Wheels {
+    /// When (µs, the board's clock, wrapping).
+    pub time_us: u32,
+    /// Forward, left (m) and heading (rad), in the wheels' own frame.
+    pub pose: [f32; 3],
+}
+
+/// A rate of the gyroscope as it came in.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Gyro {
+    /// When (µs, the board's clock, wrapping).
+    pub time_us: u32,
+    /// Counter-clockwise (rad/s).
+    pub rate: f32,
 }
 
 /// Beams of a packet, in equal steps.

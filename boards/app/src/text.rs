@@ -50,7 +50,12 @@ pub fn append<const N: usize>(message: &Telemetry, out: &mut Vec<u8, N>) {
             let [x, y, theta] = truth.pose;
             Line(out).word("  really ").pose(x, y, theta)
         }
-        Telemetry::Cost(_) | Telemetry::Quality(_) | Telemetry::Raw(_) | Telemetry::Scan(_) => {
+        Telemetry::Cost(_)
+        | Telemetry::Quality(_)
+        | Telemetry::Raw(_)
+        | Telemetry::Scan(_)
+        | Telemetry::Wheels(_)
+        | Telemetry::Gyro(_) => {
             return;
         }
     };
@@ -148,6 +153,10 @@ fn verdict(verdict: Verdict) -> &'static str {
         Verdict::Ambiguous => "ambiguous",
         Verdict::TooFar => "too far",
         Verdict::Refused => "refused",
+        Verdict::NothingFound => "nothing found",
+        Verdict::Unlikely => "unlikely",
+        Verdict::BadGuess => "bad guess",
+        Verdict::BadConfig => "bad setting",
     }
 }
 

@@ -15,9 +15,9 @@ use embedded_io_async::{Read, Write};
 pub struct Lines<L, C, T> {
     /// From the lidar; buffered, for bytes arrive while a match is computed.
     pub lidar: L,
-    /// From whom it may concern.
+    /// The command line: wheels, gyroscope, questions.
     pub commands: C,
-    /// To whom it may concern.
+    /// The telemetry line: poses and health.
     pub telemetry: T,
 }
 
@@ -64,11 +64,14 @@ pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
             }
             Ok(Either::Second(Err(_))) | Err(_) => continue,
         };
-        for &byte in bytes.unwrap_or_default() {
-            let sent = match is_lidar {
-                true => app.lidar(byte),
-                false => app.command(byte),
+        let mut rest = bytes.unwrap_or_default();
+        while !rest.is_empty() {
+            let (taken, sent) = if is_lidar {
+                app.lidar(rest)
+            } else {
+                app.command(rest)
             };
+            rest = rest.get(taken..).unwrap_or_default();
             if !sent.is_empty() {
                 let _ = lines.telemetry.write_all(sent).await;
                 log(app);
@@ -92,8 +95,12 @@ async fn simulate<const N: usize>(
         if ring.is_empty() {
             return;
         }
-        while let Some(byte) = ring.pop() {
-            let sent = app.lidar(byte);
+        let mut bytes = [0; 64];
+        let count = ring.read(&mut bytes);
+        let mut rest = bytes.get(..count).unwrap_or_default();
+        while !rest.is_empty() {
+            let (taken, sent) = app.lidar(rest);
+            rest = rest.get(taken..).unwrap_or_default();
             if !sent.is_empty() {
                 let _ = telemetry.write_all(sent).await;
                 let _ = telemetry.write_all(app.truth(demo)).await;

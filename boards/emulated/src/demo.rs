@@ -17,8 +17,11 @@ pub fn run<const N: usize>(app: &mut App<N>) -> io::Result<()> {
     output.write_all(app.ready(Reset::Other))?;
     let mut demo = Demo::new();
     while app.seen().turns < TURNS {
-        for byte in demo.packet() {
-            let sent = app.lidar(byte);
+        let packet = demo.packet();
+        let mut rest = packet.as_slice();
+        while !rest.is_empty() {
+            let (taken, sent) = app.lidar(rest);
+            rest = rest.get(taken..).unwrap_or_default();
             if !sent.is_empty() {
                 output.write_all(sent)?;
                 output.write_all(app.truth(&mut demo))?;

@@ -30,7 +30,7 @@ pub fn run<const N: usize>(
         };
         for &byte in bytes {
             machine.restart();
-            let frames = app.command(byte);
+            let (_, frames) = app.command(&[byte]);
             let instructions = machine.instructions();
             if !frames.is_empty() {
                 output.write_all(frames)?;

@@ -13,7 +13,7 @@ fn main() -> ! {
     uart::send(APP.ready(Reset::Other));
     loop {
         if let Some(byte) = uart::received() {
-            uart::send(APP.lidar(byte));
+            uart::send(APP.lidar(&[byte]).1);
         }
     }
 }

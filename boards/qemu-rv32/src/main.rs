@@ -16,7 +16,7 @@ fn main() -> ! {
     uart::send(app.ready(Reset::Other));
     loop {
         if let Some(byte) = uart::received() {
-            uart::send(app.lidar(byte));
+            uart::send(app.lidar(&[byte]).1);
         }
     }
 }

@@ -17,6 +17,8 @@ enum Piece {
     Lidar(Vec<u8>),
     Commands(Vec<u8>),
     Wheels(f32, f32, f32),
+    Gyro(f32),
+    Time(u32),
     /// A revolution in a round room.
     Turn {
         mm: u16,
@@ -48,14 +50,10 @@ fuzz_target!(|pieces: Vec<Piece>| {
         let mut commands = heapless::Vec::<u8, 2048>::new();
         match *piece {
             Piece::Lidar(ref bytes) => {
-                for &byte in bytes {
-                    read(app.lidar(byte));
-                }
+                app.lidar_all(bytes, &mut read);
             }
             Piece::Commands(ref bytes) => {
-                for &byte in bytes {
-                    read(app.command(byte));
-                }
+                app.command_all(bytes, &mut read);
             }
             Piece::Wheels(x, y, theta) => {
                 assert!(link::append(
@@ -63,6 +61,10 @@ fuzz_target!(|pieces: Vec<Piece>| {
                     &mut commands
                 ));
             }
+            Piece::Gyro(rate) => {
+                assert!(link::append(&Command::Gyro { rate }, &mut commands));
+            }
+            Piece::Time(now_us) => app.set_time(now_us),
             Piece::Turn {
                 mm,
                 growth,
@@ -102,8 +104,6 @@ fuzz_target!(|pieces: Vec<Piece>| {
             }
             Piece::Health => assert!(link::append(&Command::Health, &mut commands)),
         }
-        for &byte in &commands {
-            read(app.command(byte));
-        }
+        app.command_all(&commands, &mut read);
     }
 });

@@ -7,6 +7,7 @@ use beamfix_app::{
 };
 
 use crate::formats::Recorded;
+use crate::formats::capture::{self, Content};
 
 /// Framed commands in the order in which a board receives them.
 #[derive(Debug, Clone, Default)]
@@ -70,6 +71,25 @@ impl Commands {
         if let Some(next) = scans.last().and_then(|recorded| recorded.beams.first()) {
             commands.scan(&[*next]);
         }
+        commands
+    }
+
+    /// A capture: its bytes, and its wheels between them.
+    #[must_use]
+    pub fn of_capture(capture: &[u8]) -> Self {
+        let mut commands = Self::new();
+        let mut bytes = Vec::new();
+        for piece in capture::pieces(capture) {
+            match piece.content {
+                Content::Bytes(more) => bytes.extend_from_slice(more),
+                Content::Wheels(pose) => {
+                    commands.lidar(&std::mem::take(&mut bytes));
+                    commands.wheels(pose);
+                }
+                _ => {}
+            }
+        }
+        commands.lidar(&bytes);
         commands
     }
 

@@ -180,17 +180,17 @@ pub fn compare(board: &Board, bytes: &[u8]) -> Result<usize> {
     let mut poses = 0;
     for piece in bytes.chunks(1024) {
         stream.send(piece)?;
-        for &byte in piece {
-            for &sent in app.lidar(byte) {
-                let Some(expected) = here.push::<Telemetry>(sent) else {
-                    continue;
-                };
-                let got = timeless(stream.receive()?);
-                if format!("{got:?}") != format!("{expected:?}") {
-                    bail!("{}: pose {poses}: {got:?}, here {expected:?}", board.name);
-                }
-                poses += usize::from(matches!(expected, Telemetry::Pose(_)));
+        let mut sent = Vec::new();
+        app.lidar(piece, |out| sent.extend_from_slice(out));
+        for byte in sent {
+            let Some(expected) = here.push::<Telemetry>(byte) else {
+                continue;
+            };
+            let got = timeless(stream.receive()?);
+            if format!("{got:?}") != format!("{expected:?}") {
+                bail!("{}: pose {poses}: {got:?}, here {expected:?}", board.name);
             }
+            poses += usize::from(matches!(expected, Telemetry::Pose(_)));
         }
     }
     Ok(poses)

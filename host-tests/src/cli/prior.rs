@@ -8,10 +8,3 @@ pub enum Prior {
     Odometry,
     None,
 }
-
-impl Prior {
-    /// What the odometry gets of the wheels' poses.
-    pub fn of<T>(self, wheels: Option<T>) -> Option<T> {
-        wheels.filter(|_| self == Self::Odometry)
-    }
-}

@@ -24,13 +24,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let log = formats::read_with(&args.log, &args.options())?;
     eprintln!("beamfix: {}: {}", args.log.display(), taken(args, &log));
-    let size = match args.tier {
-        Some(tier) => tier as usize,
-        None => size::fitting(log.scans.iter().map(|scan| &scan.beams[..])),
-    };
+    // The log alone decides the poses; the tier only whether there is room.
+    let directions = size::fitting(log.scans.iter().map(|scan| &scan.beams[..]));
+    let size = args.tier.map_or(directions, |tier| tier as usize);
     match args.mode {
         Mode::Localize => localize::run(args, &log, size)?,
-        Mode::Odometry | Mode::Slam => odometry::run(args, &log, size)?,
+        Mode::Odometry | Mode::Slam => odometry::run(args, &log, (size, directions))?,
     }
     if let Some(remarks) = log.remarks() {
         eprintln!("beamfix: {}: {remarks}", args.log.display());

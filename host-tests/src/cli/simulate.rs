@@ -7,17 +7,17 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use beamfix::geometry::Pose;
-use beamfix::lidar::Model;
-use beamfix::odometry::{Counters, OdometryConfig};
+use beamfix::odometry::{Counters, Odometry};
 use beamfix::scan::Mount;
 use beamfix_sim::encoder;
 use beamfix_sim::lidar::Ranging;
 use beamfix_sim::{Drive, Settings};
 use host_tests::decode::{self, Summary};
+use host_tests::formats::bytes::Content;
 use host_tests::formats::capture::log::{self, Turn};
-use host_tests::formats::capture::{Content, Recorder};
-use host_tests::formats::ros_map;
-use host_tests::pipeline::Pipeline;
+use host_tests::formats::capture::simulated;
+use host_tests::formats::{Log, ros_map};
+use host_tests::pipeline::{config, follow};
 use host_tests::report::mcap::McapFile;
 use host_tests::report::picture;
 use host_tests::{size, sized};
@@ -54,8 +54,6 @@ pub struct Args {
     json: bool,
 }
 
-/// Pieces of a recording before the first bytes.
-const HEAD: usize = 2;
 /// Every so many scans are drawn.
 const DRAWN: usize = 4;
 
@@ -80,9 +78,19 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(path) = &args.ros_map {
         write_map(&drive, path)?;
     }
-    let (turns, summary) = record(args, &settings, &drive, model)?;
+    let (bytes, turns, summary) = simulated::capture(&drive, settings.mount, model)?;
+    let path = args.out.join("lidar.rec");
+    fs::write(&path, &bytes).with_context(|| path.display().to_string())?;
+    if turns.is_empty() {
+        bail!(
+            "--seconds {}: not one whole turn of the lidar",
+            args.seconds
+        );
+    }
+    let content = Content { bytes, cut: None };
+    let log = log::parse("the simulated drive", content, model.name)?;
     let size = size::fitting(turns.iter().map(|turn| &turn.beams[..]));
-    sized!(size, follow(args, &settings, drive, &turns, &summary))
+    sized!(size, replay(args, &settings, drive, &log, &turns, &summary))
 }
 
 /// Side of a cell of a written map (m).
@@ -104,80 +112,47 @@ fn write_map(drive: &Drive, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Records what came over the line, as a robot would, and decodes that; the recording gets the wheels as well.
-fn record(
-    args: &Args,
-    settings: &Settings,
-    drive: &Drive,
-    model: &Model,
-) -> Result<(Vec<Turn>, Summary)> {
-    let write = |turns: &[Turn]| -> Result<Vec<u8>> {
-        let mut recorder = Recorder::new(Vec::new())?;
-        recorder.push(0, Content::Lidar(model.name))?;
-        recorder.push(0, Content::Mount(settings.mount.into()))?;
-        let mut start = 0;
-        for (frame, &(end, measured_us)) in drive.frames.iter().enumerate() {
-            let on_line_us = (end - start) as f64 * 1e7 / f64::from(model.baud);
-            let time_us = (measured_us + on_line_us) as u64;
-            let turn = turns.iter().find(|turn| turn.piece == frame + HEAD);
-            if let Some(now) = turn.and_then(|turn| moment(drive, turn)) {
-                recorder.push(time_us, Content::Wheels(now.wheels.into()))?;
-            }
-            recorder.push(time_us, Content::Bytes(&drive.bytes[start..end]))?;
-            start = end;
-        }
-        Ok(recorder.finish()?)
-    };
-    let (turns, summary) = log::turns(model.name, &write(&[])?)?;
-    let path = args.out.join("lidar.rec");
-    fs::write(&path, write(&turns)?).with_context(|| path.display().to_string())?;
-    Ok((turns, summary))
-}
-
 /// Follows the robot by what its lidar saw, with room for N beams a turn.
-fn follow<const N: usize>(
+fn replay<const N: usize>(
     args: &Args,
     settings: &Settings,
     drive: Drive,
+    log: &Log,
     turns: &[Turn],
     summary: &Summary,
 ) -> Result<ExitCode> {
-    let Some(origin) = turns.first().and_then(|turn| moment(&drive, turn)) else {
-        bail!(
-            "--seconds {}: not one whole turn of the lidar",
-            args.seconds
-        );
-    };
-    let config = OdometryConfig::DEFAULT.with_mount(Mount {
-        robot_from_lidar: settings.mount.into(),
-        ..Mount::DEFAULT
-    });
-    let mut pipeline = Pipeline::<N>::new(config);
+    let moment = |turn| simulated::moment(&drive, turn).context("a turn ends at a beam");
+    let origin = moment(turns.first().context("there is a turn")?)?;
     let mut mcap = McapFile::create(&args.out.join("run.mcap"), &["estimate", "truth", "wheels"])?;
     let mut trajectory = output::create(&args.out.join("trajectory.txt"))?;
     let mut truth = output::create(&args.out.join("truth.txt"))?;
     let mut track = Track::new(origin.truth, settings.mount.into(), DRAWN);
     let bar = output::progress(turns.len(), "matching");
-    for turn in turns {
-        let Some(now) = moment(&drive, turn) else {
-            break;
-        };
-        let step = pipeline.step(&turn.beams, args.prior.of(Some(now.wheels.into())));
+    let mount = Mount {
+        robot_from_lidar: settings.mount.into(),
+        ..Mount::DEFAULT
+    };
+    let odometry = Odometry::<N>::new(config(mount, N));
+    let wheels = args.prior == Prior::Odometry;
+    let mut turns = turns.iter();
+    let followed = follow(log, (usize::MAX, wheels), odometry, &mut |scan, pose, _| {
+        let now = moment(turns.next().context("a turn for each scan")?)?;
         let true_pose: Pose = origin.truth.between(now.truth).into();
         let wheels: Pose = origin.wheels.between(now.wheels).into();
         let at = At {
             time: now.time,
-            estimate: step.pose,
+            estimate: pose,
             truth: Some(true_pose),
             wheels: Some(wheels),
         };
-        let points = track.push(at, &turn.beams);
-        mcap.push(now.time, &points, &[step.pose, true_pose, wheels])?;
-        for (file, pose) in [(&mut trajectory, step.pose), (&mut truth, true_pose)] {
+        let points = track.push(at, &scan.beams);
+        mcap.push(now.time, &points, &[pose, true_pose, wheels])?;
+        for (file, pose) in [(&mut trajectory, pose), (&mut truth, true_pose)] {
             writeln!(file, "{:.6} {} {} {}", now.time, pose.x, pose.y, pose.theta)?;
         }
         bar.inc(1);
-    }
+        Ok(())
+    })?;
     bar.finish_and_clear();
     mcap.finish()?;
     trajectory.flush()?;
@@ -206,15 +181,15 @@ fn follow<const N: usize>(
         refused,
         keyframes,
         lost,
-    } = pipeline.counters();
+    } = followed.estimator.counters();
     let value = json!({
         "lidar": args.lidar, "seed": args.seed,
         "final_error_m": errors.last.0, "final_error_deg": errors.last.1,
         "max_error_m": errors.largest.0, "max_error_deg": errors.largest.1,
         "wheels_error_m": errors.wheels.0, "wheels_error_deg": errors.wheels.1,
         "distance_m": drive.distance, "seconds": seconds, "scans": scans,
-        "refused": refused, "keyframes": keyframes, "lost": lost, "refused_beams": pipeline.refused_beams,
-        "bytes": drive.bytes.len(), "packets": summary.packets, "pose_hash": pipeline.hash.to_string(),
+        "refused": refused, "keyframes": keyframes, "lost": lost, "refused_beams": followed.refused_beams,
+        "bytes": drive.bytes.len(), "packets": summary.packets, "pose_hash": followed.hash.to_string(),
     });
     let text = format!(
         "{caption}\nwheels alone: {:.1} cm, {:.2}° at the end\n{} bytes, {} packets, {} scans, {} refused, {} keyframes\n\
@@ -226,14 +201,9 @@ fn follow<const N: usize>(
         scans,
         refused,
         keyframes,
-        pipeline.hash,
+        followed.hash,
         args.out.display()
     );
     output::report(args.json, &value, &text)?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// The robot at a turn's last beam.
-fn moment(drive: &Drive, turn: &Turn) -> Option<beamfix_sim::Moment> {
-    drive.moments.get(turn.ends_at.checked_sub(1)?).copied()
 }

@@ -8,14 +8,15 @@
 //! | 8 | `BYTES+T2` |
 //! | | then pieces: |
 //! | 8 | time (µs), `u64` |
-//! | 1 | what it is: 0 bytes of the lidar, 1 wheels, 2 name of the lidar, 3 the lidar's place on the robot |
+//! | 1 | what it is: 0 bytes of the lidar, 1 wheels, 2 name of the lidar, 3 the lidar's place on the robot, 4 gyroscope |
 //! | 4 | length of the rest, `u32` |
-//! | … | bytes; x, y (m), heading (rad) as three `f32`; text; three `f32` again |
+//! | … | bytes; x, y (m), heading (rad) as three `f32`; text; three `f32` again; rate of turn (rad/s) as `f32` |
 //!
-//! All little-endian. Wheels count for the turn that the next bytes complete. Pieces of other kinds are skipped. A file
+//! All little-endian, on one clock. Pieces of other kinds are skipped. A file
 //! without this start is bytes of the lidar alone.
 
 pub mod log;
+pub mod simulated;
 pub mod telemetry;
 
 use std::borrow::Cow;
@@ -42,6 +43,8 @@ pub enum Content<'a> {
     Bytes(&'a [u8]),
     /// The robot's pose by its wheels, in a frame of their own.
     Wheels(Pose),
+    /// The robot's rate of turn by a gyroscope, counter-clockwise (rad/s).
+    Gyro(f32),
     /// Which lidar it is.
     Lidar(&'a str),
     /// The lidar's pose on the robot.
@@ -72,6 +75,7 @@ impl<W: Write> Recorder<W> {
             Content::Wheels(wheels) => (1, pose(wheels)),
             Content::Lidar(name) => (2, Cow::Borrowed(name.as_bytes())),
             Content::Mount(mount) => (3, pose(mount)),
+            Content::Gyro(rate) => (4, Cow::Owned(rate.to_le_bytes().to_vec())),
         };
         let length = u32::try_from(payload.len()).map_err(io::Error::other)?;
         self.output.write_all(&time_us.to_le_bytes())?;
@@ -109,6 +113,7 @@ pub fn pieces(file: &[u8]) -> Vec<Piece<'_>> {
             1 => pose(payload).map(Content::Wheels),
             2 => std::str::from_utf8(payload).ok().map(Content::Lidar),
             3 => pose(payload).map(Content::Mount),
+            4 => rate(payload).map(Content::Gyro),
             _ => None,
         };
         pieces.extend(content.map(|content| Piece {
@@ -131,6 +136,11 @@ fn pose(payload: &[u8]) -> Option<Pose> {
         }
         _ => None,
     }
+}
+
+fn rate(payload: &[u8]) -> Option<f32> {
+    let rate = f32::from_le_bytes(payload.try_into().ok()?);
+    rate.is_finite().then_some(rate)
 }
 
 /// The lidar's bytes of a file with or without times.
@@ -169,6 +179,7 @@ mod tests {
             (5, Content::Bytes(&[1, 2, 3])),
             (1 << 40, Content::Bytes(&[])),
             (7, Content::Wheels(Pose::new(1.5, f32::MIN_POSITIVE, -3.1))),
+            (8, Content::Gyro(-0.5)),
             (9, Content::Bytes(&[4])),
         ];
         let mut recorder = Recorder::new(Vec::new()).expect("memory");

@@ -32,8 +32,11 @@ fn on_host<const N: usize>() -> String {
     let mut demo = Demo::new();
     let mut text = app.ready(beamfix_app::telemetry::Reset::Other).to_vec();
     while app.seen().turns < 400 {
-        for byte in demo.packet() {
-            let sent = app.lidar(byte);
+        let packet = demo.packet();
+        let mut rest = packet.as_slice();
+        while !rest.is_empty() {
+            let (taken, sent) = app.lidar(rest);
+            rest = &rest[taken..];
             if !sent.is_empty() {
                 text.extend_from_slice(sent);
                 text.extend_from_slice(app.truth(&mut demo));

@@ -84,7 +84,7 @@ fn pymavlink_reads_poses_and_obstacles() {
     let mut sent = app.ready(Reset::Power).to_vec();
     for (k, &byte) in bytes.iter().enumerate() {
         app.set_time(k as u32 * 57);
-        sent.extend_from_slice(app.lidar(byte));
+        app.lidar_all(&[byte], |out| sent.extend_from_slice(out));
     }
     let messages = parsed(&python, "host.mavlink", &sent);
     let mut commands = Commands::new();

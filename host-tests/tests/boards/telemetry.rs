@@ -1,5 +1,11 @@
 //! Frames: how long they can get, and what they say about a match.
 
+use beamfix::{
+    config::ConfigError,
+    linalg::{Covariance, Sym3},
+    matching::MatchError,
+    odometry::{Refusal, Step},
+};
 use beamfix_app::{
     AppConfig, BEAMS, CONFIG, link,
     telemetry::{
@@ -54,6 +60,7 @@ fn no_frame_is_longer_than_it_may_be() {
         weak: Some(Weak {
             direction: [WORST; 3],
             sigma: WORST,
+            lever: WORST,
         }),
         iterations: u8::MAX,
         starts: u8::MAX,
@@ -95,9 +102,7 @@ fn sent(turns: u32, mm: impl Fn(f64, f64) -> Option<f64>) -> Vec<Telemetry> {
     let mut receiver = link::Receiver::new();
     let mut messages = Vec::new();
     let mut sent = app.ready(Reset::Other).to_vec();
-    for byte in bytes {
-        sent.extend_from_slice(app.lidar(byte));
-    }
+    app.lidar_all(&bytes, |out| sent.extend_from_slice(out));
     messages.extend(sent.iter().filter_map(|&byte| receiver.push(byte)));
     assert_eq!(receiver.counters().errors, 0);
     messages
@@ -167,8 +172,12 @@ fn a_corridor_says_along_what_it_is_weak() {
         let Ok(found) = quality.found else {
             continue;
         };
-        let direction = found.weak.expect("a corridor has one").direction;
+        let Weak {
+            direction, lever, ..
+        } = found.weak.expect("a corridor has one");
         assert!(direction[0].abs() > 0.98, "{direction:?}");
+        // The mean range between two walls 1 m away, seen as far as 12 m: 1/sin of the bearing, averaged.
+        assert!((1.5..3.0).contains(&lever), "{lever} m");
         let [xx, _, yy, ..] = found.covariance;
         assert!(xx > 100.0 * yy, "{pose:?}");
         weak += 1;
@@ -193,5 +202,46 @@ fn a_refusal_says_its_numbers() {
             panic!("{quality:?}");
         };
         assert!(found < needed && found > 0.0, "{found} of {needed}");
+    }
+}
+
+#[test]
+fn every_refusal_has_its_own_name() {
+    let config = ConfigError::OutOfRange {
+        setting: "min_score",
+        value: 2.0,
+        min: 0.0,
+        max: 1.0,
+    };
+    let (found, needed) = (3, 30);
+    let errors = [
+        MatchError::TooFewBeams { found, needed },
+        MatchError::TooFewLines { found, needed },
+        MatchError::TooFewCorrespondences { found, needed },
+        MatchError::BadGuess,
+        MatchError::BadConfig(config),
+        MatchError::NothingFound { min_score: 0.3 },
+        MatchError::Degenerate,
+        MatchError::Unlikely { score: 0.1 },
+        MatchError::NotConverged { step: 0.1 },
+        MatchError::Ambiguous { ratio: 0.9 },
+    ];
+    let refusals = errors.map(Refusal::NoMatch).into_iter().chain([
+        Refusal::First,
+        Refusal::TooFar {
+            distance: 1.0,
+            rotation: 0.1,
+        },
+    ]);
+    for refusal in refusals {
+        let step = Step {
+            pose: beamfix::geometry::Pose::IDENTITY,
+            covariance: Covariance(Sym3::diagonal(1.0, 1.0, 1.0)),
+            outcome: Err(refusal),
+            keyframe: false,
+        };
+        let name = format!("{:?}", Verdict::of(&step));
+        let told = format!("{refusal:?}").replace("NoMatch(", "");
+        assert!(told.starts_with(&name), "{refusal:?} is told as {name}");
     }
 }

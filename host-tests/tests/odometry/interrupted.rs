@@ -45,14 +45,14 @@ impl Robot {
     }
 
     fn takes(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            for &sent in self.app.lidar(byte) {
-                if let Some(Telemetry::Pose(pose)) = self.receiver.push(sent) {
-                    if self.poses.is_empty() {
-                        self.cable.first(&pose);
-                    }
-                    self.poses.push(pose);
+        let mut sent = Vec::new();
+        self.app.lidar(bytes, |out| sent.extend_from_slice(out));
+        for byte in sent {
+            if let Some(Telemetry::Pose(pose)) = self.receiver.push(byte) {
+                if self.poses.is_empty() {
+                    self.cable.first(&pose);
                 }
+                self.poses.push(pose);
             }
         }
     }

@@ -1,16 +1,21 @@
 //! One pipeline: what a board makes of bytes, wheels and gyroscope, the tool makes of a recording of them.
 
 use beamfix::geometry::{EgoMotion, Pose};
+use beamfix::lidar::ld06::check_code;
 use beamfix::odometry::{Odometry, OdometryConfig};
 use beamfix::scan::Scan;
-use beamfix_app::BEAMS;
+use beamfix_app::command::Command;
+use beamfix_app::telemetry::{self, Telemetry};
+use beamfix_app::{App, AppConfig, BEAMS, CONFIG, link};
 use beamfix_sim::encoder::ld06::Sensor;
 use beamfix_sim::{Drive, Settings, TruePose, drive};
 use host_tests::board::Replay;
 use host_tests::board::commands::Commands;
+use host_tests::formats;
 use host_tests::formats::capture::log::{self, Turn};
+use host_tests::formats::capture::{self, Content, Recorder};
 use host_tests::golden::difference;
-use host_tests::pipeline::Pipeline;
+use host_tests::pipeline::{Pipeline, follow};
 
 /// A drive with the lidar at the robot's centre, as the firmware has it.
 fn driven(seconds: f64) -> Drive {
@@ -87,4 +92,265 @@ fn the_poses_do_not_depend_on_the_capacity_that_holds_the_beams() {
     assert_eq!(difference(&wanted, &poses::<1024>(&turns)), None);
     // One that does not hold all directions has others.
     assert!(difference(&wanted, &poses::<451>(&turns)).is_some());
+}
+
+/// What a robot sends its board besides the lidar's bytes.
+#[derive(Debug, Clone, Copy)]
+struct Senses {
+    /// Time between two poses of the wheels, and a message that is lost.
+    wheels_ms: Option<u32>,
+    lost: Option<u32>,
+    /// Time between two rates of the gyroscope.
+    gyro_ms: Option<u32>,
+}
+
+/// A drive with wheels and gyroscope at their own rates, all on one clock; from second to second of `covered` the lidar
+/// sees nothing.
+fn recorded(drive: &Drive, senses: Senses, covered: (f64, f64)) -> Vec<u8> {
+    let mut events: Vec<(u64, Content)> = Vec::new();
+    let mut start = 0;
+    let mut frames = Vec::new();
+    for &(end, measured_us) in &drive.frames {
+        let mut frame = drive.bytes[start..end].to_vec();
+        if (covered.0..covered.1).contains(&(measured_us * 1e-6)) {
+            for point in frame[6..42].chunks_exact_mut(3) {
+                point[..2].copy_from_slice(&[0, 0]);
+            }
+            frame[46] = check_code(&frame[..46]);
+        }
+        // 47 bytes of ten bits at 230 400 baud.
+        frames.push((measured_us as u64 + 2040, frame));
+        start = end;
+    }
+    events.extend(
+        frames
+            .iter()
+            .map(|(us, frame)| (*us, Content::Bytes(frame))),
+    );
+    let at = |ms: u32| {
+        let seconds = f64::from(ms) * 1e-3;
+        let next = drive
+            .moments
+            .partition_point(|moment| moment.time <= seconds);
+        drive.moments[next.saturating_sub(1)]
+    };
+    let end_ms = (drive.moments.last().expect("a drive").time * 1e3) as u32;
+    if let Some(every) = senses.wheels_ms {
+        for ms in (0..end_ms).step_by(every as usize) {
+            if senses.lost != Some(ms / every) {
+                events.push((u64::from(ms) * 1000, Content::Wheels(at(ms).wheels.into())));
+            }
+        }
+    }
+    if let Some(every) = senses.gyro_ms {
+        for ms in (every..end_ms).step_by(every as usize) {
+            let turned = at(ms - every).truth.between(at(ms).truth).theta;
+            let rate = (turned * 1e3 / f64::from(every)) as f32;
+            // The mean over the time before it was the rate in its middle.
+            events.push((u64::from(ms - every / 2) * 1000, Content::Gyro(rate)));
+        }
+    }
+    events.sort_by_key(|&(us, _)| us);
+    let mut recorder = Recorder::new(Vec::new()).expect("memory");
+    recorder.push(0, Content::Lidar("ld06")).expect("memory");
+    for (us, content) in events {
+        recorder.push(us, content).expect("memory");
+    }
+    recorder.finish().expect("memory")
+}
+
+/// The application over a capture, its clock starting at any time: what it sends, all of it asked for.
+fn board_over(capture: &[u8], start_us: u32) -> Vec<Telemetry> {
+    let mut app = Box::new(App::<BEAMS>::new(AppConfig {
+        record: true,
+        quality: true,
+        ..CONFIG
+    }));
+    let mut sent = Vec::new();
+    let command = |app: &mut App<BEAMS>, command: Command, sent: &mut Vec<u8>| {
+        let mut frame = heapless::Vec::<u8, 128>::new();
+        assert!(link::append(&command, &mut frame));
+        app.command_all(&frame, |out| sent.extend_from_slice(out));
+    };
+    let mut slices = [1usize, 7, 32, 3, 60].into_iter().cycle();
+    for piece in capture::pieces(capture) {
+        let us = piece.time_us.expect("written") as u32;
+        app.set_time(start_us.wrapping_add(us));
+        match piece.content {
+            // As they come out of a buffer: any number at a time, later ones later.
+            Content::Bytes(mut bytes) => {
+                let mut later_us = us;
+                while !bytes.is_empty() {
+                    let count = slices.next().expect("endless").min(bytes.len());
+                    app.lidar_all(&bytes[..count], |out| sent.extend_from_slice(out));
+                    bytes = &bytes[count..];
+                    later_us += 150;
+                    app.set_time(start_us.wrapping_add(later_us));
+                }
+            }
+            Content::Wheels(Pose { x, y, theta }) => {
+                command(&mut app, Command::Wheels { x, y, theta }, &mut sent);
+            }
+            Content::Gyro(rate) => command(&mut app, Command::Gyro { rate }, &mut sent),
+            _ => {}
+        }
+    }
+    command(&mut app, Command::Health, &mut sent);
+    let mut receiver = link::Receiver::new();
+    let messages = sent
+        .iter()
+        .filter_map(|&byte| receiver.push(byte))
+        .collect();
+    assert_eq!(receiver.counters().errors, 0);
+    messages
+}
+
+fn poses(messages: &[Telemetry]) -> Vec<Pose> {
+    let poses = messages.iter().filter_map(|message| match message {
+        Telemetry::Pose(telemetry::Pose { pose, .. }) => Some(*pose),
+        _ => None,
+    });
+    poses.map(|[x, y, theta]| Pose { x, y, theta }).collect()
+}
+
+/// The tool over a capture.
+fn tool_over(capture: Vec<u8>) -> Vec<Pose> {
+    let content = formats::bytes::Content {
+        bytes: capture,
+        cut: None,
+    };
+    let log = log::parse("test", content, "ld06").expect("an LD06");
+    let mut poses = Vec::new();
+    let odometry = Odometry::<BEAMS>::new(CONFIG.odometry);
+    follow(&log, (usize::MAX, true), odometry, &mut |_, pose, _| {
+        poses.push(pose);
+        Ok(())
+    })
+    .expect("nothing fails");
+    poses
+}
+
+#[test]
+fn a_boards_drive_with_wheels_and_gyroscope_replays_to_the_same_bits() {
+    let drive = driven(12.0);
+    for senses in [
+        Senses {
+            wheels_ms: Some(37),
+            lost: Some(90),
+            gyro_ms: None,
+        },
+        Senses {
+            wheels_ms: Some(200),
+            lost: None,
+            gyro_ms: Some(10),
+        },
+        Senses {
+            wheels_ms: None,
+            lost: None,
+            gyro_ms: Some(20),
+        },
+    ] {
+        let sent = recorded(&drive, senses, (0.0, 0.0));
+        // The board's clock wraps on the way.
+        let messages = board_over(&sent, u32::MAX - 5_000_000);
+        let echoes = messages
+            .iter()
+            .filter(|message| matches!(message, Telemetry::Wheels(_) | Telemetry::Gyro(_)))
+            .count();
+        assert!(echoes > 50, "{senses:?}: {echoes}");
+        let mut frames = Vec::new();
+        for message in &messages {
+            let mut frame = heapless::Vec::<u8, 256>::new();
+            assert!(link::append(message, &mut frame));
+            frames.extend_from_slice(&frame);
+        }
+        let capture = capture::telemetry::capture(&frames).expect("a board's frames");
+        // The pose's covariance is that of the way since the start, not that of its last match.
+        let since_start = messages.iter().rev().find_map(|message| match message {
+            Telemetry::Pose(pose) => Some(pose.covariance),
+            _ => None,
+        });
+        let of_match = messages.iter().rev().find_map(|message| match message {
+            Telemetry::Quality(quality) => quality.found.ok().map(|found| found.covariance),
+            _ => None,
+        });
+        let (since_start, of_match) = (since_start.expect("poses"), of_match.expect("matches"));
+        assert!(
+            since_start[5] > 2.0 * of_match[5],
+            "{since_start:?} {of_match:?}"
+        );
+        let (board, tool) = (poses(&messages), tool_over(capture));
+        assert!(board.len() > 110, "{}", board.len());
+        assert_eq!(difference(&board, &tool), None, "{senses:?}");
+        // And wheels and gyroscope have a say.
+        let without = tool_over(recorded(
+            &drive,
+            Senses {
+                wheels_ms: None,
+                lost: None,
+                gyro_ms: None,
+            },
+            (0.0, 0.0),
+        ));
+        assert!(difference(&board, &without).is_some(), "{senses:?}");
+    }
+}
+
+#[test]
+fn wheels_of_any_rate_and_a_gyroscope_lead_through_a_cover_that_blinds_the_lidar() {
+    // In these seconds the robot turns.
+    let (from, to) = (10.0, 11.5);
+    let drive = driven(to + 0.2);
+    let none = Senses {
+        wheels_ms: None,
+        lost: None,
+        gyro_ms: None,
+    };
+    let off = |senses| {
+        let poses = tool_over(recorded(&drive, senses, (from, to)));
+        let turns = turns(&drive.bytes);
+        let truth = |k: usize| drive.moments[turns[k].ends_at - 1].truth;
+        let k = ((to - 0.2) * 10.0) as usize;
+        let k = turns
+            .iter()
+            .position(|turn| drive.moments[turn.ends_at - 1].time > to - 0.15)
+            .unwrap_or(k);
+        let off = truth(0).between(truth(k)).between(poses[k].into());
+        (off.distance(), off.theta.abs().to_degrees())
+    };
+    let blind = off(none);
+    assert!(
+        blind.0 > 0.3 && blind.1 > 30.0,
+        "without wheels the cover shows: {blind:?}"
+    );
+    let wheels = |wheels_ms, lost| Senses {
+        wheels_ms: Some(wheels_ms),
+        lost: Some(lost),
+        gyro_ms: None,
+    };
+    let gyro_ms = Some(10);
+    // The simulated wheels tell distances to 2 % and headings to some degrees in a hard turn. What comes after the last
+    // message is only expected: at 5 Hz a turn that changes by 4 rad/s² is off by 0.08 rad meanwhile.
+    let mut failed = Vec::new();
+    for (senses, allowed) in [
+        (wheels(10, 0), (0.05, 4.0)),
+        (wheels(100, 105), (0.06, 5.0)),
+        (wheels(200, 0), (0.08, 8.0)),
+        (wheels(200, 53), (0.08, 8.0)),
+        (
+            Senses {
+                gyro_ms,
+                ..wheels(200, 0)
+            },
+            (0.08, 1.0),
+        ),
+        (Senses { gyro_ms, ..none }, (0.5, 1.0)),
+    ] {
+        let (metres, degrees) = off(senses);
+        println!("{senses:?}: {metres:.3} m, {degrees:.2}°; blind {blind:?}");
+        if metres > allowed.0 || degrees > allowed.1 {
+            failed.push((senses, metres, degrees));
+        }
+    }
+    assert!(failed.is_empty(), "{failed:?}");
 }

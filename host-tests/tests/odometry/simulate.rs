@@ -78,7 +78,7 @@ fn the_drive_through_the_flat_ends_within_3_cm_and_half_a_degree() {
         error.1
     );
     assert_eq!(counters.scans as usize, turns.len());
-    assert_eq!(pipeline.refused_beams, 0);
+    assert_eq!(pipeline.refused_beams(), 0);
     assert!(
         error.0 < 0.03 && error.1 < 0.5,
         "final error {} m, {}°",

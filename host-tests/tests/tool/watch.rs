@@ -108,7 +108,7 @@ fn frames_of_a_file_are_drawn_and_recorded_to_the_byte() {
     for (k, &byte) in bytes.iter().enumerate() {
         // From just before the clock wraps.
         app.set_time((k as u32 * 57).wrapping_sub(1_000_000));
-        sent.extend_from_slice(app.lidar(byte));
+        app.lidar_all(&[byte], |out| sent.extend_from_slice(out));
     }
     let frames = folder.join("frames.bin");
     fs::write(&frames, &sent).expect("the test's file");

@@ -134,6 +134,11 @@ impl Args {
         self.mount.unwrap_or(log.mount)
     }
 
+    /// Whether wheels and gyroscope of the log are the guess.
+    pub fn uses_wheels(&self) -> bool {
+        self.prior == Prior::Odometry
+    }
+
     /// How many of a log's scans are replayed.
     pub fn count(&self, scans: usize) -> usize {
         self.scans.map_or(scans, |most| most.min(scans))

@@ -3,13 +3,15 @@
 use std::io::Write;
 
 use anyhow::{Context, Result};
-use beamfix::geometry::{Pose, Twist};
-use beamfix::localization::{Localizer, LocalizerConfig, Verdict};
+use beamfix::geometry::Pose;
+use beamfix::localization::{Localizer, LocalizerConfig};
 use beamfix::matching::correlative::pyramid::Pyramid;
-use beamfix::scan::{Points, PointsConfig, Scan};
+use beamfix::pipeline::{Estimate as _, MapLocalizer, Verdict};
+use beamfix::scan::PointsConfig;
 use beamfix_sim::TruePose;
 use host_tests::formats::Log;
 use host_tests::formats::field::FieldFile;
+use host_tests::pipeline::follow;
 use host_tests::report::hash::PoseHash;
 use host_tests::report::picture;
 use host_tests::report::track::{At, Track};
@@ -19,11 +21,7 @@ use serde_json::json;
 use super::args::{Args, DRAWN};
 use crate::cli::output;
 
-/// Bytes that a search may look up between two scans: a fifth of a second of an M4F at 168 MHz.
-const BUDGET: u32 = 10_000_000;
-
 /// What a replay in a map came to.
-#[derive(Default)]
 struct Outcome {
     scans: usize,
     /// Scans with a pose that the map confirms.
@@ -33,7 +31,7 @@ struct Outcome {
     /// Times the pose was lost.
     lost: u32,
     searches: u32,
-    refused_beams: usize,
+    refused_beams: u32,
     hash: PoseHash,
     last: Pose,
 }
@@ -70,81 +68,67 @@ fn in_map<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
     let field = file.field()?;
     let mut buffer = vec![0; Pyramid::bytes(field.grid().shape())];
     let pyramid = Pyramid::new(field, &mut buffer)?;
-    let mut robot = Box::new(Localizer::<96>::new(pyramid, LocalizerConfig::DEFAULT));
     let mount = args.mount_of(log);
+    let points = PointsConfig {
+        mount,
+        ..PointsConfig::DEFAULT
+    };
+    let localizer = Localizer::<96>::new(pyramid, LocalizerConfig::DEFAULT);
+    let mut localizer = MapLocalizer::<N, 96>::new(localizer, points);
     if let Some(start) = args.start {
-        robot.start_at(start * mount.robot_from_lidar);
+        localizer.start_at(start);
     }
     let mut trajectory = args.trajectory.as_deref().map(output::create).transpose()?;
     let count = args.count(log.scans.len());
     let bar = output::progress(count, "localizing");
-    let mut outcome = Outcome {
-        scans: count,
-        ..Outcome::default()
-    };
-    let (mut scan, mut points) = (Box::new(Scan::<N>::new()), Box::new(Points::<N>::new()));
-    let mut before: Option<Pose> = None;
     let mut track = Track::new(
         TruePose::default(),
         mount.robot_from_lidar,
         (count / DRAWN).max(1),
     );
-    for recorded in &log.scans[..count] {
-        scan.clear();
-        for &beam in &recorded.beams {
-            outcome.refused_beams += usize::from(scan.push(beam).is_err());
+    let (mut tracked, mut doubtful) = (0, 0);
+    let ego = (count, args.uses_wheels());
+    let followed = follow(log, ego, localizer, &mut |scan, pose, located| {
+        match located.verdict() {
+            Verdict::Measured => tracked += 1,
+            Verdict::Predicted => doubtful += 1,
+            Verdict::Unknown => {}
         }
-        let wheels = args.prior.of(recorded.wheels);
-        let robot_motion = match (before, wheels) {
-            (Some(before), Some(now)) => before.between(now),
-            _ => Pose::IDENTITY,
-        };
-        before = wheels;
-        let motion = mount.lidar_motion(robot_motion);
-        points.assign(
-            &scan,
-            Twist::from_motion(motion, scan.duration()),
-            &PointsConfig {
-                mount,
-                ..PointsConfig::DEFAULT
-            },
-        );
-        match robot.update(points.as_slice(), motion) {
-            Verdict::Tracking(..) => outcome.tracked += 1,
-            Verdict::Doubtful(_) => outcome.doubtful += 1,
-            Verdict::Searching | Verdict::Choosing { .. } => {}
+        if args.picture.is_some() && located.pose.is_some() {
+            let us = scan.beams.last().map_or(0, |beam| beam.time_us);
+            let at = At {
+                time: f64::from(us) * 1e-6,
+                estimate: pose,
+                truth: None,
+                wheels: None,
+            };
+            track.push(at, &scan.beams);
         }
-        robot.step(BUDGET);
-        if let Some(pose) = robot.pose() {
-            outcome.last = pose * mount.robot_from_lidar.inverse();
-            if args.picture.is_some() {
-                let us = recorded.beams.last().map_or(0, |beam| beam.time_us);
-                let at = At {
-                    time: f64::from(us) * 1e-6,
-                    estimate: outcome.last,
-                    truth: None,
-                    wheels: None,
-                };
-                track.push(at, &recorded.beams);
-            }
-        }
-        outcome.hash.push(outcome.last);
         if let Some(file) = &mut trajectory {
-            let Pose { x, y, theta } = outcome.last;
-            writeln!(file, "{} {x} {y} {theta}", recorded.stamp)?;
+            let Pose { x, y, theta } = pose;
+            writeln!(file, "{} {x} {y} {theta}", scan.stamp)?;
         }
         bar.inc(1);
-    }
+        Ok(())
+    })?;
     bar.finish_and_clear();
     if let Some(mut file) = trajectory {
         file.flush()?;
     }
     if let Some(path) = &args.picture {
-        let caption = format!("{count} scans, pose hash {}", outcome.hash);
+        let caption = format!("{count} scans, pose hash {}", followed.hash);
         let title = format!("beamfix: {} localized", args.name());
         picture::save(&track.map(title, caption, None), path)?;
     }
-    outcome.lost = robot.counters().lost;
-    outcome.searches = robot.counters().searches;
-    Ok(outcome)
+    let counters = followed.estimator.localizer().counters();
+    Ok(Outcome {
+        scans: followed.scans,
+        tracked,
+        doubtful,
+        lost: counters.lost,
+        searches: counters.searches,
+        refused_beams: followed.refused_beams,
+        hash: followed.hash,
+        last: followed.last,
+    })
 }

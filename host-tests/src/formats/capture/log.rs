@@ -6,7 +6,7 @@ use anyhow::{Context, Result, ensure};
 use beamfix::geometry::Pose;
 use beamfix::scan::{Assembler, Beam, Mount};
 
-use super::super::{Log, Recorded, bytes, thinned};
+use super::super::{Capture, Log, Recorded, bytes, thinned};
 use crate::decode::{self, Summary};
 use crate::formats::capture::telemetry;
 use crate::formats::capture::{self, Content};
@@ -19,11 +19,13 @@ pub const MOST_BEAMS: usize = 1024;
 pub struct Turn {
     /// Its beams in order; of more than [`MOST_BEAMS`] one for each direction.
     pub beams: Vec<Beam>,
+    /// Whether it had more.
+    pub is_thinned: bool,
     /// Beams of the stream up to and with its last one.
     pub ends_at: usize,
     /// Number of the capture's piece whose bytes completed it.
     pub piece: usize,
-    /// Where the wheels said the robot was, if the capture tells.
+    /// Where the wheels last said the robot was, if they said so during the turn.
     pub wheels: Option<Pose>,
 }
 
@@ -41,8 +43,10 @@ pub fn turns(lidar: &str, stream: &[u8]) -> Result<(Vec<Turn>, Summary)> {
     let summary = decode::decode(lidar, stream, &mut |row| {
         if assembler.push(row.beam, row.turn_starts) {
             let first = recent.len().saturating_sub(assembler.scan().len());
+            let beams = recent.split_off(first);
             turns.push(Turn {
-                beams: thinned(recent.split_off(first), MOST_BEAMS),
+                is_thinned: beams.len() > MOST_BEAMS,
+                beams: thinned(beams, MOST_BEAMS),
                 ends_at: count,
                 piece: row.piece,
                 wheels: None,
@@ -60,12 +64,10 @@ pub fn turns(lidar: &str, stream: &[u8]) -> Result<(Vec<Turn>, Summary)> {
             _ => None,
         })
         .peekable();
-    let mut last = None;
     for turn in &mut turns {
         while let Some((_, pose)) = wheels.next_if(|(k, _)| *k < turn.piece) {
-            last = Some(pose);
+            turn.wheels = Some(pose);
         }
-        turn.wheels = last;
     }
     Ok((turns, summary))
 }
@@ -76,12 +78,8 @@ pub fn read(path: &Path, lidar: &str) -> Result<Log> {
     parse(&path.display().to_string(), content, lidar)
 }
 
-/// Reads a capture that was loaded already.
-pub(in crate::formats) fn parse(
-    name: &str,
-    mut content: bytes::Content,
-    lidar: &str,
-) -> Result<Log> {
+/// Reads a capture that was loaded already, or made.
+pub fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Result<Log> {
     if let Some(capture) = telemetry::capture(&content.bytes) {
         content.bytes = capture;
     }
@@ -123,6 +121,12 @@ pub(in crate::formats) fn parse(
             summary.skipped_bytes
         ));
     }
+    // Finer ones are thinned first, which the pipeline does not.
+    let fits = turns.iter().all(|turn| !turn.is_thinned);
+    log.capture = fits.then_some(Capture {
+        bytes: content.bytes,
+        model,
+    });
     log.scans = turns
         .into_iter()
         .map(|turn| {

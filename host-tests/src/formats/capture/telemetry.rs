@@ -1,5 +1,6 @@
 //! A board's telemetry as a capture: its frames with the lidar's bytes, where it was told to send them.
 
+use beamfix::geometry::Pose;
 use beamfix_app::link::Receiver;
 use beamfix_app::telemetry::Telemetry;
 
@@ -15,20 +16,50 @@ pub fn capture(file: &[u8]) -> Option<Vec<u8>> {
     }
     let mut receiver = Receiver::new();
     let mut recorder = Recorder::new(Vec::new()).ok()?;
-    let (mut time_us, mut is_any) = (0u64, false);
+    let (mut clock, mut is_any) = (Clock::default(), false);
     for &byte in file {
-        let Some(Telemetry::Raw(raw)) = receiver.push::<Telemetry>(byte) else {
+        let Some(message) = receiver.push::<Telemetry>(byte) else {
             continue;
         };
-        let passed = raw.time_us.wrapping_sub(time_us as u32);
-        // Nothing is sent out of order: what seems to be is the first one.
-        time_us += u64::from(passed);
-        recorder.push(time_us, Content::Bytes(&raw.bytes)).ok()?;
-        is_any = true;
+        if let Some((time_us, content)) = content(&message) {
+            recorder.push(clock.after(time_us), content).ok()?;
+            is_any |= matches!(content, Content::Bytes(_));
+        }
     }
     // A check code of 16 bits holds once by chance; a board's frames fail it now and then.
     let counters = receiver.counters();
     (is_any && counters.frames > counters.errors).then(|| recorder.finish().ok())?
+}
+
+/// What a board's message adds to a capture, and when it came in (µs, the board's clock, wrapping).
+#[must_use]
+pub fn content(message: &Telemetry) -> Option<(u32, Content<'_>)> {
+    match message {
+        Telemetry::Raw(raw) => Some((raw.time_us, Content::Bytes(&raw.bytes))),
+        Telemetry::Wheels(wheels) => {
+            let [x, y, theta] = wheels.pose;
+            Some((wheels.time_us, Content::Wheels(Pose { x, y, theta })))
+        }
+        Telemetry::Gyro(gyro) => Some((gyro.time_us, Content::Gyro(gyro.rate))),
+        _ => None,
+    }
+}
+
+/// A board's clock, which wraps after 71 minutes, going on.
+#[derive(Debug, Default)]
+pub struct Clock {
+    last_us: Option<u64>,
+}
+
+impl Clock {
+    /// The time of the next message (µs).
+    pub fn after(&mut self, time_us: u32) -> u64 {
+        // Nothing is sent out of order.
+        let last_us = self.last_us.unwrap_or(time_us.into());
+        let now_us = last_us + u64::from(time_us.wrapping_sub(last_us as u32));
+        self.last_us = Some(now_us);
+        now_us
+    }
 }
 
 #[cfg(test)]
@@ -48,14 +79,12 @@ mod tests {
             quality: true,
         };
         assert!(link::append(&send, &mut ask) && link::append(&Command::Health, &mut ask));
-        for &byte in &ask {
-            sent.extend_from_slice(app.command(byte));
-        }
+        app.command_all(&ask, |out| sent.extend_from_slice(out));
         let line: Vec<u8> = (0..2000u32).map(|k| ((k * k) >> 3) as u8).collect();
         let start = u32::MAX - 40_000;
         for (k, &byte) in line.iter().enumerate() {
             app.set_time(start.wrapping_add(43 * k as u32));
-            sent.extend_from_slice(app.lidar(byte));
+            app.lidar_all(&[byte], |out| sent.extend_from_slice(out));
         }
         let file = capture(&sent).expect("a board's frames");
         let back = plain(&file);
