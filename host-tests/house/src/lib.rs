@@ -6,4 +6,5 @@ mod math;
 mod pages;
 mod plan;
 mod public_api;
+mod rules;
 mod source;

@@ -180,3 +180,34 @@ fn files_can_be_read_in_one_sitting() {
         &median_is_high.into_iter().collect::<Vec<_>>(),
     );
 }
+
+#[test]
+fn a_circle_and_an_import_upwards_are_found() {
+    let import = |from: &str, to: &str| Import {
+        from: from.to_owned(),
+        to: to.to_owned(),
+        line: 1,
+        written: String::new(),
+        in_tests: false,
+    };
+    let imports = [
+        import("math.rs", "scan.rs"),
+        import("scan.rs", "scan/points.rs"),
+        import("scan/points.rs", "math.rs"),
+        import("odometry.rs", "scan.rs"),
+    ];
+    let circles = circles_of(&imports);
+    assert_eq!(circles, [["math.rs", "scan.rs", "scan/points.rs"]]);
+    let up = imports.iter().filter(|import| !goes_down(import));
+    assert_eq!(up.map(line).count(), 1);
+    // Beside is not below, a wing has its place, and a room's own page belongs to no wing.
+    for (from, to, is_down) in [
+        ("slam/graph.rs", "odometry.rs", false),
+        ("lidar/wire/framing.rs", "lidar/sensors/ld06.rs", false),
+        ("lidar/sensors/ld06.rs", "lidar/wire/framing.rs", true),
+        ("lidar/wire.rs", "lidar.rs", true),
+        ("lidar.rs", "grid.rs", false),
+    ] {
+        assert_eq!(goes_down(&import(from, to)), is_down, "{from} imports {to}");
+    }
+}

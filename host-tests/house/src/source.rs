@@ -63,24 +63,20 @@ struct Found {
 impl Source {
     /// Reads the library.
     pub fn read() -> Self {
-        let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../src");
+        Self::of(texts())
+    }
+
+    /// Reads files: their paths below `src/`, and their texts.
+    fn of(files: Vec<(String, String)>) -> Self {
         let mut source = Self::default();
-        let mut files = Vec::new();
-        walk(&src, &mut files);
-        for path in files {
-            let text = fs::read_to_string(&path).expect("a source file");
-            let below = path.strip_prefix(&src).expect("below src");
-            let file = below.to_str().expect("UTF-8").replace('\\', "/");
+        for (file, text) in files {
             source.lines.insert(file.clone(), text.lines().count());
-            let mut module: Names = below
-                .with_extension("")
-                .iter()
-                .map(|part| part.to_str().expect("UTF-8").to_owned())
-                .collect();
-            if module == ["lib"] {
-                module.clear();
-            }
-            let parsed = syn::parse_file(&text).unwrap_or_else(|error| panic!("{file}: {error}"));
+            let name = file.trim_end_matches(".rs");
+            let module: Names = match name {
+                "lib" => Vec::new(),
+                name => name.split('/').map(str::to_owned).collect(),
+            };
+            let parsed = parse(&file, &text);
             let mut reader = Reader {
                 source: &mut source,
                 file,
@@ -181,6 +177,31 @@ impl Source {
     }
 }
 
+/// Every file of the library: its path below `src/`, and its text.
+fn texts() -> Vec<(String, String)> {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../src");
+    let mut files = Vec::new();
+    walk(&src, &mut files);
+    let read = |path: PathBuf| {
+        let text = fs::read_to_string(&path).expect("a source file");
+        let below = path.strip_prefix(&src).expect("below src");
+        (below.to_str().expect("UTF-8").replace('\\', "/"), text)
+    };
+    files.into_iter().map(read).collect()
+}
+
+/// Every file of the library: its path below `src/`, and its syntax.
+pub fn parsed() -> impl Iterator<Item = (String, syn::File)> {
+    texts().into_iter().map(|(file, text)| {
+        let syntax = parse(&file, &text);
+        (file, syntax)
+    })
+}
+
+fn parse(file: &str, text: &str) -> syn::File {
+    syn::parse_file(text).unwrap_or_else(|error| panic!("{file}: {error}"))
+}
+
 fn walk(folder: &Path, files: &mut Vec<PathBuf>) {
     let mut entries: Vec<PathBuf> = fs::read_dir(folder)
         .expect("a folder")
@@ -247,7 +268,9 @@ impl Reader<'_> {
                 let line = glob.star_token.spans[0].start().line;
                 if let Some(path) = self.rooted(before) {
                     self.here().globs.push(path);
-                    self.found([before, &["*".to_owned()]].concat(), line);
+                    if is_private {
+                        self.found([before, &["*".to_owned()]].concat(), line);
+                    }
                 }
             }
         }
@@ -324,7 +347,8 @@ impl Reader<'_> {
     }
 }
 
-fn is_test(attributes: &[syn::Attribute]) -> bool {
+/// Whether `#[cfg(test)]` stands before an item.
+pub fn is_test(attributes: &[syn::Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         attribute.path().is_ident("cfg")
             && attribute
@@ -373,4 +397,42 @@ impl<'ast> Visit<'ast> for Reader<'_> {
     fn visit_visibility(&mut self, _: &'ast syn::Visibility) {}
 
     fn visit_attribute(&mut self, _: &'ast syn::Attribute) {}
+}
+
+#[test]
+fn paths_lead_to_the_files_that_define_things() {
+    let files = [
+        (
+            "lib.rs",
+            "pub mod low; pub mod high; pub use high::part::Thing;",
+        ),
+        (
+            "low.rs",
+            "use crate::Thing; pub fn f() {} #[cfg(test)] mod tests { use super::*; use crate::high; fn t() { high::g(); f() } }",
+        ),
+        (
+            "high.rs",
+            "pub mod part; pub use part::*; use core::fmt; pub fn g() { assert!(crate::low::f()); fmt::write() }",
+        ),
+        (
+            "high/part.rs",
+            "use super::super::low; pub struct Thing; impl Thing { fn h() { low::f(); Self::h() } }",
+        ),
+    ];
+    let files = files.map(|(file, text)| (file.to_owned(), text.to_owned()));
+    let imports = Source::of(files.into()).imports();
+    let found: Vec<_> = imports
+        .iter()
+        .map(|import| (import.from.as_str(), import.to.as_str(), import.in_tests))
+        .collect();
+    assert_eq!(
+        found,
+        [
+            ("high.rs", "low.rs", false),
+            ("high/part.rs", "low.rs", false),
+            ("low.rs", "high.rs", true),
+            ("low.rs", "high/part.rs", false),
+        ],
+        "{imports:#?}"
+    );
 }
