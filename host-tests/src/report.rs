@@ -1,8 +1,9 @@
 //! What a run leaves behind: pictures, scores, pose hashes, tracks and MCAP files.
 
-pub mod hash;
 pub mod mcap;
 pub mod picture;
 pub mod scene;
 pub mod score;
 pub mod track;
+
+pub use beamfix_app::hash;

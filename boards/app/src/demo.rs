@@ -3,7 +3,7 @@
 //!
 //! In integers, so that a board without a floating point unit keeps up with it, and everywhere the same bytes.
 
-use crate::App;
+use crate::{App, hash::PoseHash};
 use beamfix::{
     geometry::Pose,
     lidar::ld06::{FRAME, POINTS, check_code},
@@ -181,7 +181,7 @@ impl Demo {
 pub struct FirstPoses {
     /// How many.
     pub count: u32,
-    /// FNV-1a over the bits of each pose's x, y and heading, little endian.
+    /// Their [`PoseHash`].
     pub hash: u64,
 }
 
@@ -194,19 +194,16 @@ pub const FIRST_POSES: FirstPoses = FirstPoses {
 impl FirstPoses {
     /// What this machine finds.
     pub fn find<const N: usize>(&self, app: &mut App<N>, demo: &mut Demo) -> u64 {
-        let mut hash = 0xcbf2_9ce4_8422_2325;
+        let mut hash = PoseHash::new();
         let mut seen = 0;
         while seen < self.count {
             app.lidar_all(&demo.packet(), |_| ());
             if app.seen().turns != seen {
                 seen = app.seen().turns;
-                let Pose { x, y, theta } = app.pose();
-                for byte in [x, y, theta].into_iter().flat_map(f32::to_le_bytes) {
-                    hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-                }
+                hash.push(app.pose());
             }
         }
-        hash
+        hash.value()
     }
 }
 

@@ -14,6 +14,8 @@ pub mod checks;
 pub mod command;
 #[cfg(feature = "demo")]
 pub mod demo;
+#[cfg(feature = "demo")]
+pub mod hash;
 pub mod link;
 #[cfg(feature = "mavlink")]
 pub mod mavlink;

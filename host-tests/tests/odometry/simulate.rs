@@ -9,6 +9,7 @@ use beamfix_sim::{Drive, Settings, drive, scenes};
 use beamfix_sim::{Noise, Still, TruePose};
 use host_tests::formats::capture::log;
 use host_tests::pipeline::Pipeline;
+use host_tests::report::hash::Fnv1a;
 use host_tests::report::score;
 
 fn run(seed: u64, seconds: f64) -> Drive {
@@ -28,11 +29,10 @@ fn pipeline() -> Box<Pipeline<456>> {
     }))
 }
 
-/// FNV-1a over bytes.
 fn hash(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, &b| {
-        (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
-    })
+    let mut hash = Fnv1a::EMPTY;
+    hash.push(bytes);
+    hash.0
 }
 
 #[test]
