@@ -16,7 +16,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// One measurement of a decoded stream: as the sensor itself gives it, and as the library's beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
-    /// Turns begun before it.
+    /// Revolutions begun before it.
     pub scan: u32,
     /// When it was measured (µs, the sensor's clock where it has one).
     pub time_us: u32,
@@ -28,8 +28,8 @@ pub struct Row {
     pub quality: u16,
     /// The same for matching.
     pub beam: Beam,
-    /// Whether it is the first of a turn.
-    pub turn_starts: bool,
+    /// Whether it is the first of a revolution.
+    pub revolution_starts: bool,
     /// Number of the recording's piece whose bytes completed it.
     pub piece: usize,
 }
@@ -45,7 +45,7 @@ pub struct Summary {
     pub skipped_bytes: u32,
     /// Bytes at the end that may begin a frame.
     pub tail_bytes: u32,
-    /// Turns begun.
+    /// Revolutions begun.
     pub scans: u32,
     /// Measurements, with or without a range.
     pub points: u32,
@@ -165,8 +165,8 @@ impl Summary {
         sink: &mut dyn FnMut(Row),
     ) {
         for (k, (sample, beam)) in packet.samples().zip(packet.beams()).enumerate() {
-            let turn_starts = packet.revolution_start() == Some(k);
-            self.scans += u32::from(turn_starts);
+            let revolution_starts = packet.revolution_start() == Some(k);
+            self.scans += u32::from(revolution_starts);
             self.points += 1;
             let turned = is_signed && sample.angle_deg >= 180.0;
             sink(Row {
@@ -176,7 +176,7 @@ impl Summary {
                 range_mm: sample.range_mm,
                 quality: sample.quality,
                 beam,
-                turn_starts,
+                revolution_starts,
                 piece,
             });
         }

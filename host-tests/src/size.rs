@@ -1,10 +1,10 @@
-//! Memory configurations that are compiled into the tool: how many beams a turn has room for.
+//! Memory configurations that are compiled into the tool: how many beams a revolution has room for.
 //!
-//! A reference keeps a line for each of N directions, so N is best what the lidar measures in a full turn.
+//! A reference keeps a line for each of N directions, so N is best what the lidar measures in a revolution.
 
 use beamfix::scan::Beam;
 
-/// Beams a turn, smallest first.
+/// Beams a revolution, smallest first.
 pub const SIZES: [usize; 5] = [360, 456, 512, 720, 1024];
 
 /// The smallest of [`SIZES`] with room for the usual one of these scans, the largest where none has.
@@ -15,10 +15,10 @@ pub fn fitting<'a>(scans: impl Iterator<Item = &'a [Beam]>) -> usize {
     for scan in scans {
         lengths.push(scan.len());
         if finest == 0 && scan.len() > 2 {
-            finest = per_turn(scan);
+            finest = per_revolution(scan);
         }
     }
-    // The median: a turn whose start was lost in a damaged frame is twice as long as any other.
+    // The median: a revolution whose start was lost in a damaged frame is twice as long as any other.
     lengths.sort_unstable();
     let usual = lengths.get(lengths.len() / 2).copied().unwrap_or(0);
     let needed = usual.max(finest);
@@ -29,8 +29,8 @@ pub fn fitting<'a>(scans: impl Iterator<Item = &'a [Beam]>) -> usize {
         .unwrap_or(largest)
 }
 
-/// Beams that a full turn would have, by the median step between two of a scan.
-fn per_turn(scan: &[Beam]) -> usize {
+/// Beams that a revolution would have, by the median step between two of a scan.
+fn per_revolution(scan: &[Beam]) -> usize {
     let step =
         |pair: &[Beam]| (pair[1].bearing.0.wrapping_sub(pair[0].bearing.0) as i16).unsigned_abs();
     let mut steps: Vec<u16> = scan.windows(2).map(step).collect();

@@ -49,8 +49,8 @@ pub struct Watch<W> {
     path: Vec<[f64; 2]>,
     truth: Vec<[f64; 2]>,
     /// Beams of the revolution in progress, in the robot's frame.
-    turn: Vec<Point>,
-    turns: usize,
+    revolution: Vec<Point>,
+    revolutions: usize,
     points: Vec<[f64; 2]>,
 }
 
@@ -82,8 +82,8 @@ impl<W: Write> Watch<W> {
             clock: telemetry::Clock::default(),
             path: Vec::new(),
             truth: Vec::new(),
-            turn: Vec::new(),
-            turns: 0,
+            revolution: Vec::new(),
+            revolutions: 0,
             points: Vec::new(),
         })
     }
@@ -167,7 +167,7 @@ impl<W: Write> Watch<W> {
                     if mm > 0 {
                         let (s, c) = beamfix::math::sin_cos(bearing.radians());
                         let metres = f32::from(mm) / 1000.0;
-                        self.turn.push(Point::new(metres * c, metres * s));
+                        self.revolution.push(Point::new(metres * c, metres * s));
                     }
                 }
             }
@@ -178,13 +178,13 @@ impl<W: Write> Watch<W> {
 
     /// The revolution is complete: where its points are, the pose that came just before says.
     fn place(&mut self) {
-        let turn = std::mem::take(&mut self.turn);
+        let revolution = std::mem::take(&mut self.revolution);
         let Some(pose) = &self.pose else {
             return;
         };
         let [x, y, theta] = pose.pose;
         let robot = Pose { x, y, theta };
-        self.turns += 1;
+        self.revolutions += 1;
         // Of a long run, a part of all revolutions.
         if self.points.len() > POINTS {
             let mut k = 0;
@@ -193,7 +193,7 @@ impl<W: Write> Watch<W> {
                 k % 2 == 0
             });
         }
-        self.points.extend(turn.into_iter().map(|point| {
+        self.points.extend(revolution.into_iter().map(|point| {
             let seen = robot * point;
             [f64::from(seen.x), f64::from(seen.y)]
         }));
@@ -221,9 +221,9 @@ impl<W: Write> Watch<W> {
         let found = self.quality.and_then(|quality| quality.found.ok());
         let quality = found.map_or_else(String::new, |found| {
             let weak = found.weak.map_or_else(String::new, |weak| {
-                let [x, y, turn] = weak.direction;
+                let [x, y, rotation] = weak.direction;
                 format!(
-                    ", hardly determined along ({x:.2}, {y:.2}, {turn:.2}): {:.2} m",
+                    ", hardly determined along ({x:.2}, {y:.2}, {rotation:.2}): {:.2} m",
                     weak.sigma
                 )
             });
@@ -276,8 +276,8 @@ fn quality_line(pose: &beamfix_app::telemetry::Pose, quality: &Quality) -> Strin
     let weak = found.weak.map_or_else(
         || ",,,".into(),
         |weak| {
-            let [x, y, turn] = weak.direction;
-            format!("{x},{y},{turn},{}", weak.sigma)
+            let [x, y, rotation] = weak.direction;
+            format!("{x},{y},{rotation},{}", weak.sigma)
         },
     );
     format!(

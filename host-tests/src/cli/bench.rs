@@ -113,17 +113,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     })
 }
 
-/// Distance (mm) and turn (degrees) from the truth.
+/// Distance (mm) and rotation (degrees) from the truth.
 fn error(pair: &Pair, outcome: &Outcome) -> (f64, f64) {
     let (pose, truth) = (outcome.pose, pair.truth);
-    let [dx, dy, turn] = [
+    let [dx, dy, rotation] = [
         (pose.x, truth.x),
         (pose.y, truth.y),
         (pose.theta, truth.theta),
     ]
     .map(|(a, b)| f64::from(a) - f64::from(b));
-    let turn = libm::atan2(libm::sin(turn), libm::cos(turn));
-    (1e3 * libm::hypot(dx, dy), turn.abs().to_degrees())
+    let rotation = libm::atan2(libm::sin(rotation), libm::cos(rotation));
+    (1e3 * libm::hypot(dx, dy), rotation.abs().to_degrees())
 }
 
 fn hash(outcomes: &[Outcome]) -> PoseHash {

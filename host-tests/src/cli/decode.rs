@@ -88,7 +88,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         "skipped_bytes": skipped_bytes, "tail_bytes": tail_bytes, "scans": scans, "points": points,
     });
     let mut text = format!(
-        "{}: {packets} packets, {points} points, {scans} turns; {check_errors} frames failed their check, \
+        "{}: {packets} packets, {points} points, {scans} revolutions; {check_errors} frames failed their check, \
          {skipped_bytes} bytes skipped, {tail_bytes} left at the end",
         model.name
     );

@@ -14,7 +14,7 @@ use beamfix_sim::lidar::Ranging;
 use beamfix_sim::{Drive, Settings};
 use host_tests::decode::{self, Summary};
 use host_tests::formats::bytes::Content;
-use host_tests::formats::capture::log::{self, Turn};
+use host_tests::formats::capture::log::{self, Revolution};
 use host_tests::formats::capture::simulated;
 use host_tests::formats::{Log, ros_map};
 use host_tests::pipeline::{config, follow};
@@ -78,19 +78,22 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(path) = &args.ros_map {
         write_map(&drive, path)?;
     }
-    let (bytes, turns, summary) = simulated::capture(&drive, settings.mount, model)?;
+    let (bytes, revolutions, summary) = simulated::capture(&drive, settings.mount, model)?;
     let path = args.out.join("lidar.rec");
     fs::write(&path, &bytes).with_context(|| path.display().to_string())?;
-    if turns.is_empty() {
+    if revolutions.is_empty() {
         bail!(
-            "--seconds {}: not one whole turn of the lidar",
+            "--seconds {}: not one whole revolution of the lidar",
             args.seconds
         );
     }
     let content = Content { bytes, cut: None };
     let log = log::parse("the simulated drive", content, model.name)?;
-    let size = size::fitting(turns.iter().map(|turn| &turn.beams[..]));
-    sized!(size, replay(args, &settings, drive, &log, &turns, &summary))
+    let size = size::fitting(revolutions.iter().map(|revolution| &revolution.beams[..]));
+    sized!(
+        size,
+        replay(args, &settings, drive, &log, &revolutions, &summary)
+    )
 }
 
 /// Side of a cell of a written map (m).
@@ -112,31 +115,32 @@ fn write_map(drive: &Drive, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Follows the robot by what its lidar saw, with room for N beams a turn.
+/// Follows the robot by what its lidar saw, with room for N beams a revolution.
 fn replay<const N: usize>(
     args: &Args,
     settings: &Settings,
     drive: Drive,
     log: &Log,
-    turns: &[Turn],
+    revolutions: &[Revolution],
     summary: &Summary,
 ) -> Result<ExitCode> {
-    let moment = |turn| simulated::moment(&drive, turn).context("a turn ends at a beam");
-    let origin = moment(turns.first().context("there is a turn")?)?;
+    let moment =
+        |revolution| simulated::moment(&drive, revolution).context("a revolution ends at a beam");
+    let origin = moment(revolutions.first().context("there is a revolution")?)?;
     let mut mcap = McapFile::create(&args.out.join("run.mcap"), &["estimate", "truth", "wheels"])?;
     let mut trajectory = output::create(&args.out.join("trajectory.txt"))?;
     let mut truth = output::create(&args.out.join("truth.txt"))?;
     let mut track = Track::new(origin.truth, settings.mount.into(), DRAWN);
-    let bar = output::progress(turns.len(), "matching");
+    let bar = output::progress(revolutions.len(), "matching");
     let mount = Mount {
         robot_from_lidar: settings.mount.into(),
         ..Mount::DEFAULT
     };
     let odometry = Odometry::<N>::new(config(mount, N));
     let wheels = args.prior == Prior::Odometry;
-    let mut turns = turns.iter();
+    let mut revolutions = revolutions.iter();
     let followed = follow(log, (usize::MAX, wheels), odometry, &mut |scan, pose, _| {
-        let now = moment(turns.next().context("a turn for each scan")?)?;
+        let now = moment(revolutions.next().context("a revolution for each scan")?)?;
         let true_pose: Pose = origin.truth.between(now.truth).into();
         let wheels: Pose = origin.wheels.between(now.wheels).into();
         let at = At {

@@ -13,9 +13,9 @@ const RIGHT: (f64, f64) = (0.05, 1.0);
 #[must_use]
 pub fn error(found: Pose, truth: Pose) -> (f64, f64) {
     let (found, truth) = (TruePose::from(found), TruePose::from(truth));
-    let turn = beamfix_sim::pose::wrap(found.theta - truth.theta);
+    let rotation = beamfix_sim::pose::wrap(found.theta - truth.theta);
     let (x, y) = (found.x - truth.x, found.y - truth.y);
-    (libm::sqrt(x * x + y * y), turn.to_degrees().abs())
+    (libm::sqrt(x * x + y * y), rotation.to_degrees().abs())
 }
 
 /// Whether an error is small enough.

@@ -12,7 +12,7 @@ use beamfix_sim::{Drive, Settings, TruePose, drive};
 use host_tests::board::Replay;
 use host_tests::board::commands::Commands;
 use host_tests::formats;
-use host_tests::formats::capture::log::{self, Turn};
+use host_tests::formats::capture::log::{self, Revolution};
 use host_tests::formats::capture::{self, Content, Recorder};
 use host_tests::golden::difference;
 use host_tests::pipeline::{Pipeline, follow};
@@ -39,8 +39,8 @@ fn on_board(bytes: &[u8]) -> Vec<Pose> {
     poses.collect()
 }
 
-fn turns(bytes: &[u8]) -> Vec<Turn> {
-    log::turns("ld06", bytes).expect("an LD06").0
+fn revolutions(bytes: &[u8]) -> Vec<Revolution> {
+    log::revolutions("ld06", bytes).expect("an LD06").0
 }
 
 #[test]
@@ -60,9 +60,9 @@ fn an_interrupted_recording_gives_the_boards_poses() {
         for at in [1000, 1010, 1037] {
             let bytes = [&frames[..at], &frames[at + pause..]].concat().concat();
             let mut pipeline = Pipeline::<BEAMS>::new(OdometryConfig::DEFAULT);
-            let poses: Vec<Pose> = turns(&bytes)
+            let poses: Vec<Pose> = revolutions(&bytes)
                 .iter()
-                .map(|turn| pipeline.step(&turn.beams, None).pose)
+                .map(|revolution| pipeline.step(&revolution.beams, None).pose)
                 .collect();
             let board = on_board(&bytes);
             assert_eq!(difference(&board, &poses), None, "{pause} frames from {at}");
@@ -73,25 +73,25 @@ fn an_interrupted_recording_gives_the_boards_poses() {
 
 #[test]
 fn the_poses_do_not_depend_on_the_capacity_that_holds_the_beams() {
-    fn poses<const N: usize>(turns: &[Turn]) -> Vec<Pose> {
+    fn poses<const N: usize>(revolutions: &[Revolution]) -> Vec<Pose> {
         let mut odometry = Box::new(Odometry::<N>::new(OdometryConfig::DEFAULT));
         let mut scan = Box::new(Scan::<N>::new());
-        let follow = turns.iter().map(|turn| {
+        let follow = revolutions.iter().map(|revolution| {
             scan.clear();
-            for &beam in &turn.beams {
+            for &beam in &revolution.beams {
                 scan.push(beam).expect("room");
             }
             odometry.update(&scan, EgoMotion::UNKNOWN).pose
         });
         follow.collect()
     }
-    let turns = turns(&driven(12.0).bytes);
-    let wanted = poses::<456>(&turns);
-    assert_eq!(difference(&wanted, &poses::<457>(&turns)), None);
-    assert_eq!(difference(&wanted, &poses::<720>(&turns)), None);
-    assert_eq!(difference(&wanted, &poses::<1024>(&turns)), None);
+    let revolutions = revolutions(&driven(12.0).bytes);
+    let wanted = poses::<456>(&revolutions);
+    assert_eq!(difference(&wanted, &poses::<457>(&revolutions)), None);
+    assert_eq!(difference(&wanted, &poses::<720>(&revolutions)), None);
+    assert_eq!(difference(&wanted, &poses::<1024>(&revolutions)), None);
     // One that does not hold all directions has others.
-    assert!(difference(&wanted, &poses::<451>(&turns)).is_some());
+    assert!(difference(&wanted, &poses::<451>(&revolutions)).is_some());
 }
 
 /// What a robot sends its board besides the lidar's bytes.
@@ -298,7 +298,7 @@ fn a_boards_drive_with_wheels_and_gyroscope_replays_to_the_same_bits() {
 
 #[test]
 fn wheels_of_any_rate_and_a_gyroscope_lead_through_a_cover_that_blinds_the_lidar() {
-    // In these seconds the robot turns.
+    // In these seconds the robot revolutions.
     let (from, to) = (10.0, 11.5);
     let drive = driven(to + 0.2);
     let none = Senses {
@@ -308,12 +308,12 @@ fn wheels_of_any_rate_and_a_gyroscope_lead_through_a_cover_that_blinds_the_lidar
     };
     let off = |senses| {
         let poses = tool_over(recorded(&drive, senses, (from, to)));
-        let turns = turns(&drive.bytes);
-        let truth = |k: usize| drive.moments[turns[k].ends_at - 1].truth;
+        let revolutions = revolutions(&drive.bytes);
+        let truth = |k: usize| drive.moments[revolutions[k].ends_at - 1].truth;
         let k = ((to - 0.2) * 10.0) as usize;
-        let k = turns
+        let k = revolutions
             .iter()
-            .position(|turn| drive.moments[turn.ends_at - 1].time > to - 0.15)
+            .position(|revolution| drive.moments[revolution.ends_at - 1].time > to - 0.15)
             .unwrap_or(k);
         let off = truth(0).between(truth(k)).between(poses[k].into());
         (off.distance(), off.theta.abs().to_degrees())

@@ -53,7 +53,7 @@ fn a_seed_gives_the_same_bytes_every_time_and_on_every_machine() {
 #[test]
 fn the_drive_through_the_flat_ends_within_3_cm_and_half_a_degree() {
     let run = run(Settings::DEFAULT.seed, Settings::DEFAULT.seconds);
-    let (turns, summary) = log::turns("ld06", &run.bytes).expect("an LD06");
+    let (revolutions, summary) = log::revolutions("ld06", &run.bytes).expect("an LD06");
     assert_eq!((summary.check_errors, summary.skipped_bytes), (0, 0));
     let last = run.moments[run.moments.len() - 1];
     assert!(
@@ -63,21 +63,23 @@ fn the_drive_through_the_flat_ends_within_3_cm_and_half_a_degree() {
         run.distance
     );
     let mut pipeline = pipeline();
-    let origin = run.moments[turns[0].ends_at - 1].truth;
+    let origin = run.moments[revolutions[0].ends_at - 1].truth;
     let mut error = (0.0, 0.0);
-    for turn in &turns {
-        let now = run.moments[turn.ends_at - 1];
-        let pose = pipeline.step(&turn.beams, Some(now.wheels.into())).pose;
+    for revolution in &revolutions {
+        let now = run.moments[revolution.ends_at - 1];
+        let pose = pipeline
+            .step(&revolution.beams, Some(now.wheels.into()))
+            .pose;
         error = score::error(pose, origin.between(now.truth).into());
     }
     let counters = pipeline.counters();
     println!(
         "{} scans, {counters:?}: final error {:.4} m, {:.3}°",
-        turns.len(),
+        revolutions.len(),
         error.0,
         error.1
     );
-    assert_eq!(counters.scans as usize, turns.len());
+    assert_eq!(counters.scans as usize, revolutions.len());
     assert_eq!(pipeline.refused_beams(), 0);
     assert!(
         error.0 < 0.03 && error.1 < 0.5,
@@ -94,14 +96,14 @@ fn the_pose_is_as_far_off_as_it_says() {
     let (mut count, mut metres, mut degrees, mut normalised) = (0.0, 0.0, 0.0, 0.0);
     for seed in 1..=8 {
         let run = run(seed, 60.0);
-        let (turns, _) = log::turns("ld06", &run.bytes).expect("an LD06");
+        let (revolutions, _) = log::revolutions("ld06", &run.bytes).expect("an LD06");
         let mut pipeline = pipeline();
-        let origin = run.moments[turns[0].ends_at - 1].truth;
-        for (number, turn) in turns.iter().enumerate() {
-            let now = run.moments[turn.ends_at - 1];
-            let step = pipeline.step(&turn.beams, Some(now.wheels.into()));
+        let origin = run.moments[revolutions[0].ends_at - 1].truth;
+        for (number, revolution) in revolutions.iter().enumerate() {
+            let now = run.moments[revolution.ends_at - 1];
+            let step = pipeline.step(&revolution.beams, Some(now.wheels.into()));
             // At first there is hardly any error.
-            if number < turns.len() / 2 {
+            if number < revolutions.len() / 2 {
                 continue;
             }
             let truth: Pose = origin.between(now.truth).into();
@@ -131,19 +133,19 @@ fn the_pose_is_as_far_off_as_it_says() {
 #[test]
 fn a_gap_between_scans_is_bridged_by_the_wheels() {
     let run = run(1, 30.0);
-    let (turns, _) = log::turns("ld06", &run.bytes).expect("an LD06");
+    let (revolutions, _) = log::revolutions("ld06", &run.bytes).expect("an LD06");
     let mut pipeline = pipeline();
-    let origin = run.moments[turns[0].ends_at - 1].truth;
+    let origin = run.moments[revolutions[0].ends_at - 1].truth;
     let mut before = origin;
-    for (number, turn) in turns.iter().enumerate() {
+    for (number, revolution) in revolutions.iter().enumerate() {
         // Longer than the two seconds after which the clock no longer tells a velocity.
         if (150..180).contains(&number) {
             continue;
         }
-        let now = run.moments[turn.ends_at - 1];
+        let now = run.moments[revolution.ends_at - 1];
         let moved = score::error(Pose::IDENTITY, before.between(now.truth).into());
         before = now.truth;
-        let step = pipeline.step(&turn.beams, Some(now.wheels.into()));
+        let step = pipeline.step(&revolution.beams, Some(now.wheels.into()));
         let (metres, degrees) = score::error(step.pose, origin.between(now.truth).into());
         if number == 180 {
             assert!(moved.0 > 0.5, "{moved:?} in the gap");

@@ -11,12 +11,12 @@ use crate::decode::{self, Summary};
 use crate::formats::capture::telemetry;
 use crate::formats::capture::{self, Content};
 
-/// Most beams of a turn that are matched; of a finer sensor's, one for each of so many directions.
+/// Most beams of a revolution that are matched; of a finer sensor's, one for each of so many directions.
 pub const MOST_BEAMS: usize = 1024;
 
-/// One whole turn of a stream.
+/// One whole revolution of a stream.
 #[derive(Debug, Clone)]
-pub struct Turn {
+pub struct Revolution {
     /// Its beams in order; of more than [`MOST_BEAMS`] one for each direction.
     pub beams: Vec<Beam>,
     /// Whether it had more.
@@ -25,26 +25,26 @@ pub struct Turn {
     pub ends_at: usize,
     /// Number of the capture's piece whose bytes completed it.
     pub piece: usize,
-    /// Where the wheels last said the robot was, if they said so during the turn.
+    /// Where the wheels last said the robot was, if they said so during the revolution.
     pub wheels: Option<Pose>,
 }
 
 /// Room for the beams of one revolution of any lidar.
 const ROOM: usize = 8192;
 
-/// Decodes a stream of the sensor called `lidar` into whole turns, as a board's assembler does: the parts of a turn at
+/// Decodes a stream of the sensor called `lidar` into whole revolutions, as a board's assembler does: the parts of a revolution at
 /// either end are left out, and interrupted ones.
-pub fn turns(lidar: &str, stream: &[u8]) -> Result<(Vec<Turn>, Summary)> {
-    let mut turns = Vec::new();
+pub fn revolutions(lidar: &str, stream: &[u8]) -> Result<(Vec<Revolution>, Summary)> {
+    let mut revolutions = Vec::new();
     let mut assembler = Box::new(Assembler::<ROOM>::new());
-    // The beams since the last turn, with their times to the microsecond.
+    // The beams since the last revolution, with their times to the microsecond.
     let mut recent: Vec<Beam> = Vec::new();
     let mut count = 0;
     let summary = decode::decode(lidar, stream, &mut |row| {
-        if assembler.push(row.beam, row.turn_starts) {
+        if assembler.push(row.beam, row.revolution_starts) {
             let first = recent.len().saturating_sub(assembler.scan().len());
             let beams = recent.split_off(first);
-            turns.push(Turn {
+            revolutions.push(Revolution {
                 is_thinned: beams.len() > MOST_BEAMS,
                 beams: thinned(beams, MOST_BEAMS),
                 ends_at: count,
@@ -64,15 +64,15 @@ pub fn turns(lidar: &str, stream: &[u8]) -> Result<(Vec<Turn>, Summary)> {
             _ => None,
         })
         .peekable();
-    for turn in &mut turns {
-        while let Some((_, pose)) = wheels.next_if(|(k, _)| *k < turn.piece) {
-            turn.wheels = Some(pose);
+    for revolution in &mut revolutions {
+        while let Some((_, pose)) = wheels.next_if(|(k, _)| *k < revolution.piece) {
+            revolution.wheels = Some(pose);
         }
     }
-    Ok((turns, summary))
+    Ok((revolutions, summary))
 }
 
-/// Reads a capture as a log; the stamps are the sensor's clock at each turn's last beam.
+/// Reads a capture as a log; the stamps are the sensor's clock at each revolution's last beam.
 pub fn read(path: &Path, lidar: &str) -> Result<Log> {
     let content = bytes::load(path)?;
     parse(&path.display().to_string(), content, lidar)
@@ -84,7 +84,7 @@ pub fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Result<Log
         content.bytes = capture;
     }
     let model = decode::model(lidar, &content.bytes).with_context(|| name.to_owned())?;
-    let (turns, summary) = turns(model.name, &content.bytes)?;
+    let (revolutions, summary) = revolutions(model.name, &content.bytes)?;
     ensure!(
         summary.packets > 0,
         "{name}: no packet of an {lidar} in {} bytes; {} failed their check",
@@ -92,8 +92,8 @@ pub fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Result<Log
         summary.check_errors
     );
     ensure!(
-        !turns.is_empty(),
-        "{name}: no whole turn in {} packets, {} beams",
+        !revolutions.is_empty(),
+        "{name}: no whole revolution in {} packets, {} beams",
         summary.packets,
         summary.points
     );
@@ -122,19 +122,19 @@ pub fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Result<Log
         ));
     }
     // Finer ones are thinned first, which the pipeline does not.
-    let fits = turns.iter().all(|turn| !turn.is_thinned);
+    let fits = revolutions.iter().all(|revolution| !revolution.is_thinned);
     log.capture = fits.then_some(Capture {
         bytes: content.bytes,
         model,
     });
-    log.scans = turns
+    log.scans = revolutions
         .into_iter()
-        .map(|turn| {
-            let us = turn.beams.last().map_or(0, |beam| beam.time_us);
+        .map(|revolution| {
+            let us = revolution.beams.last().map_or(0, |beam| beam.time_us);
             Recorded {
                 stamp: format!("{}.{:06}", us / 1_000_000, us % 1_000_000),
-                wheels: turn.wheels,
-                beams: turn.beams,
+                wheels: revolution.wheels,
+                beams: revolution.beams,
             }
         })
         .collect();

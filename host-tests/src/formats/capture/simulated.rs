@@ -4,7 +4,7 @@ use anyhow::Result;
 use beamfix::lidar::Model;
 use beamfix_sim::{Drive, Moment, TruePose};
 
-use super::log::{self, Turn};
+use super::log::{self, Revolution};
 use super::{Content, Recorder};
 use crate::decode::Summary;
 
@@ -18,9 +18,9 @@ pub fn capture(
     drive: &Drive,
     mount: TruePose,
     model: &Model,
-) -> Result<(Vec<u8>, Vec<Turn>, Summary)> {
-    let write = |turns: &[Turn]| -> Result<Vec<u8>> {
-        let mut turns = turns.iter().peekable();
+) -> Result<(Vec<u8>, Vec<Revolution>, Summary)> {
+    let write = |revolutions: &[Revolution]| -> Result<Vec<u8>> {
+        let mut revolutions = revolutions.iter().peekable();
         let mut recorder = Recorder::new(Vec::new())?;
         recorder.push(0, Content::Lidar(model.name))?;
         recorder.push(0, Content::Mount(mount.into()))?;
@@ -28,8 +28,10 @@ pub fn capture(
         for (frame, &(end, measured_us)) in drive.frames.iter().enumerate() {
             let on_line_us = (end - start) as f64 * 1e7 / f64::from(model.baud);
             let time_us = (measured_us + on_line_us) as u64;
-            while let Some(turn) = turns.next_if(|turn| turn.piece <= frame + HEAD) {
-                if let Some(now) = moment(drive, turn) {
+            while let Some(revolution) =
+                revolutions.next_if(|revolution| revolution.piece <= frame + HEAD)
+            {
+                if let Some(now) = moment(drive, revolution) {
                     recorder.push(time_us, Content::Wheels(now.wheels.into()))?;
                 }
             }
@@ -38,12 +40,15 @@ pub fn capture(
         }
         Ok(recorder.finish()?)
     };
-    let (turns, summary) = log::turns(model.name, &write(&[])?)?;
-    Ok((write(&turns)?, turns, summary))
+    let (revolutions, summary) = log::revolutions(model.name, &write(&[])?)?;
+    Ok((write(&revolutions)?, revolutions, summary))
 }
 
 /// The robot at a revolution's last beam.
 #[must_use]
-pub fn moment(drive: &Drive, turn: &Turn) -> Option<Moment> {
-    drive.moments.get(turn.ends_at.checked_sub(1)?).copied()
+pub fn moment(drive: &Drive, revolution: &Revolution) -> Option<Moment> {
+    drive
+        .moments
+        .get(revolution.ends_at.checked_sub(1)?)
+        .copied()
 }
