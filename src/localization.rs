@@ -11,9 +11,18 @@
 //! the robot's motion has told the candidates apart. [`Localizer::update`] and [`Localizer::step`] do a bounded
 //! amount of work per call.
 
+#[cfg(not(feature = "internals"))]
+pub(crate) mod hypotheses;
+#[cfg(feature = "internals")]
 pub mod hypotheses;
 pub mod presence;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod quality;
+#[cfg(feature = "internals")]
 pub mod quality;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod search;
+#[cfg(feature = "internals")]
 pub mod search;
 
 use crate::{

@@ -4,6 +4,9 @@
 //! pyramid of maxima bounds the score of a whole block of poses at once, so blocks that cannot win are left out, and what
 //! is found is exactly the best of all poses, whatever the guess.
 
+#[cfg(not(feature = "internals"))]
+pub(crate) mod pyramid;
+#[cfg(feature = "internals")]
 pub mod pyramid;
 pub(crate) mod rotated;
 mod search;
