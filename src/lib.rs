@@ -10,10 +10,10 @@
 //! where there is a map), and the [`Pipeline`] that carries bytes from one to the other:
 //!
 //! ```
-//! use beamfix::{Odometry, OdometryConfig, Pipeline, Revolution, lidar::ld06};
+//! use beamfix::{Odometry, OdometryConfig, Pipeline, Revolution, lidar::parsers};
 //!
 //! let odometry = Odometry::<456>::new(OdometryConfig::DEFAULT);
-//! let mut pipeline = Pipeline::new(ld06::Parser::new(), odometry);
+//! let mut pipeline = Pipeline::new(parsers::Ldrobot::new(), odometry);
 //! pipeline.set_time(20_000); // µs, by the board's clock
 //! pipeline.push(&[0x54, 0x2c], &mut |revolution: Revolution<Odometry<456>, 456>| {
 //!     let step = revolution.step;

@@ -20,21 +20,21 @@
 //!
 //! | file | sensors | checked against |
 //! | --- | --- | --- |
-//! | [`ld06`] | LD06, LD19, STL-19P, STL-27L, LD14, LD14P | real bytes of LD06, LD19, LD20; the maker's parser |
+//! | `ld06` | LD06, LD19, STL-19P, STL-27L, LD14, LD14P | real bytes of LD06, LD19, LD20; the maker's parser |
 //! | | LDS-02; Oradar MS200 | one source for its parallax; several open drivers |
-//! | [`rplidar`] | A1, A2 in standard scan; C1 in standard scan | real bytes of an A1; one source for its pace |
-//! | [`rplidar::capsule`] | A1, A2 express; dense: C1, S2 | real capsules; the maker's parser |
-//! | [`rplidar::ultra`], [`rplidar::hq`] | A3, S3 | the maker's parser |
-//! | [`ydlidar`] | X2, X3, X4, G4; T-mini; COIN-D4 | real bytes of an X4, a T-mini, a COIN-D4 |
+//! | `rplidar` | A1, A2 in standard scan; C1 in standard scan | real bytes of an A1; one source for its pace |
+//! | `rplidar::capsule` | A1, A2 express; dense: C1, S2 | real capsules; the maker's parser |
+//! | `rplidar::ultra`, `rplidar::hq` | A3, S3 | the maker's parser |
+//! | `ydlidar` | X2, X3, X4, G4; T-mini; COIN-D4 | real bytes of an X4, a T-mini, a COIN-D4 |
 //! | | G2, G6, TG; T-mini Plus SH, S4B, G4B | the maker's parser; one source |
-//! | [`xv11`], [`xv11::early`] | Neato XV-11; LDS02RR | real bytes of both firmwares; one source for its direction |
-//! | [`lds006`] | LDS-006 | real bytes |
-//! | [`lds01`] | LDS-01 | two open drivers that agree |
-//! | [`camsense`] | X1, LDS08RR, "Mystery 360"; X2, T2 | real bytes; one source |
-//! | [`delta`] | Delta-1A, 2A, 2B, 2D, 2G | the makers' documents and example frames |
-//! | [`lslidar`] | N10, L10, N10P | one source |
-//! | [`scip`] | URG-04LX; UTM-30LX, UST-10LX | real bytes; the specification |
-//! | [`sick`] | LMS200, LMS291 | the telegram listing and its examples |
+//! | `xv11`, `xv11::early` | Neato XV-11; LDS02RR | real bytes of both firmwares; one source for its direction |
+//! | `lds006` | LDS-006 | real bytes |
+//! | `lds01` | LDS-01 | two open drivers that agree |
+//! | `camsense` | X1, LDS08RR, "Mystery 360"; X2, T2 | real bytes; one source |
+//! | `delta` | Delta-1A, 2A, 2B, 2D, 2G | the makers' documents and example frames |
+//! | `lslidar` | N10, L10, N10P | one source |
+//! | `scip` | URG-04LX; UTM-30LX, UST-10LX | real bytes; the specification |
+//! | `sick` | LMS200, LMS291 | the telegram listing and its examples |
 //!
 //! Not supported: Roborock's LDS01RR with the header `E7 7E` (its one description leaves open where the fields lie;
 //! units with the XV-11's frames are [`Model::XIAOMI_LDS02RR`]), LSLIDAR M10 (its fields are not sure), Delta-3A, YDLIDAR R3.
@@ -43,12 +43,17 @@
 //! proves: try it on the unit, and copy the [`Model`] with `counter_clockwise` and `zero_cdeg` as found.
 
 mod bringup;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod model;
+#[cfg(feature = "internals")]
 pub mod model;
+pub mod parsers;
 mod sensors;
 mod wire;
 
 pub use bringup::{choice, identify, motor, startup};
-pub use model::{Family, Model};
+pub use model::{Family, Model, Motor, Proof, Start};
+#[cfg(feature = "internals")]
 pub use sensors::*;
 #[cfg(any(
     feature = "embedded-io",
@@ -58,6 +63,7 @@ pub use sensors::*;
 pub use wire::io;
 pub use wire::packet::{Packet, Sample};
 pub use wire::protocol::{Counters, Protocol};
+pub use wire::request::Request;
 #[cfg(feature = "internals")]
 pub use wire::{
     framing::{self, Framer, Verdict},
@@ -66,4 +72,5 @@ pub use wire::{
     parser::{Format, Parser},
     survey, timing,
 };
+#[cfg(feature = "internals")]
 pub use wire::{request, ring};
