@@ -11,18 +11,10 @@
 //! the robot's motion has told the candidates apart. [`Localizer::update`] and [`Localizer::step`] do a bounded
 //! amount of work per call.
 
-#[cfg(not(feature = "internals"))]
-pub(crate) mod hypotheses;
-#[cfg(feature = "internals")]
+mod config;
 pub mod hypotheses;
 pub mod presence;
-#[cfg(not(feature = "internals"))]
-pub(crate) mod quality;
-#[cfg(feature = "internals")]
 pub mod quality;
-#[cfg(not(feature = "internals"))]
-pub(crate) mod search;
-#[cfg(feature = "internals")]
 pub mod search;
 
 use crate::{
@@ -30,83 +22,15 @@ use crate::{
     matching::{
         Match,
         correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid},
-        field::{self, FieldConfig},
+        field,
     },
     math,
     scan::{ScanPoint, thinning::thinned},
 };
+pub use config::LocalizerConfig;
 use hypotheses::{Hypotheses, Hypothesis};
 use quality::Quality;
 use search::Search;
-
-/// When to believe what.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LocalizerConfig {
-    /// Below this quality a scan does not fit (0…1): see [`Quality::value`]. Default 0.38.
-    pub min_quality: f32,
-    /// From this quality on a scan is no reason for doubt. Default 0.5.
-    pub confident_quality: f32,
-    /// Unless a greater share of the beams that people do not end went through walls. Default 0.125: at good poses 999 of
-    /// 1000 scans have less, at wrong ones that fit otherwise most have more.
-    pub max_wall_crossings: f32,
-    /// So many scans in a row that do not fit: lost. Default 3.
-    pub max_bad_scans: u8,
-    /// And so many that fit, but leave doubts. Default 30.
-    pub max_doubtful_scans: u8,
-    /// Mean quality from which on a candidate can be the pose. Default 0.55.
-    pub min_candidate_quality: f32,
-    /// And so much better than any other, summed over the scans. Default 0.25.
-    pub min_margin: f32,
-    /// And after so many scans. Default 2.
-    pub min_scans: u8,
-    /// After so many scans the search starts again if no candidate is accepted. Default 12.
-    pub max_scans: u8,
-    /// From one heading of the search to the next (rad). Default 0.0349: 2°.
-    pub heading_step: f32,
-    /// While tracking fails, the pose is looked for this far around the prediction (m). Default 0.4.
-    pub position_range: f32,
-    /// And turned by this much (rad). Default 0.3.
-    pub heading_range: f32,
-    /// Matching while tracking.
-    pub field: FieldConfig,
-}
-
-impl LocalizerConfig {
-    /// For lidars that see all around, in rooms.
-    pub const DEFAULT: Self = Self {
-        min_quality: 0.38,
-        confident_quality: 0.5,
-        max_wall_crossings: 0.125,
-        max_bad_scans: 3,
-        max_doubtful_scans: 30,
-        min_candidate_quality: 0.55,
-        min_margin: 0.25,
-        min_scans: 2,
-        max_scans: 12,
-        heading_step: 0.0349,
-        position_range: 0.4,
-        heading_range: 0.3,
-        field: FieldConfig::DEFAULT,
-    };
-
-    /// For candidates, of which most are wrong: a few passes, to a few centimetres.
-    fn short(&self) -> FieldConfig {
-        FieldConfig {
-            max_iterations: 8,
-            coarse_stride: 1,
-            min_inlier_share: 0.1,
-            translation_tolerance: 0.04,
-            rotation_tolerance: 0.02,
-            ..self.field
-        }
-    }
-}
-
-impl Default for LocalizerConfig {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
 
 /// What is known after a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,18 +1,23 @@
 //! Finding the motion between two scans, or between a scan and a map.
 //!
-//! Matchers share a shape, `align(reference, points, guess, config) -> Result<Match, MatchError>`. `Ok` means usable.
+//! | matcher | from | to | use |
+//! | --- | --- | --- | --- |
+//! | [`icp::align`] | a guess | a scan | odometry: fast, in integers |
+//! | [`icp::modular::align`] | a guess | a scan | comparing and teaching: every stage a choice |
+//! | [`field::align`] | a guess | a likelihood field | tracking in a map |
+//! | [`correlative::Correlator::align`] | a window | a likelihood field | where the guess is too far off for the others |
+//! | [`map::align`] | a window | a grid | two maps, to check a closed loop |
+//!
+//! Each takes what is matched against, the points (or the second grid), a guess and settings, and gives a [`Match`]
+//! ([`map::MapMatch`]) or a [`MatchError`]; those with working memory also take that: the correlative matcher is a method of
+//! its memory, the modular ICP takes a workspace. `Ok` means usable: how far it can be trusted is in the covariance, and a
+//! direction that nothing determines is named and keeps the guess.
 
 pub mod correlative;
 mod degeneracy;
 pub mod field;
 pub mod icp;
-#[cfg(not(feature = "internals"))]
-pub(crate) mod map;
-#[cfg(feature = "internals")]
 pub mod map;
-#[cfg(not(feature = "internals"))]
-pub(crate) mod virtual_scan;
-#[cfg(feature = "internals")]
 pub mod virtual_scan;
 mod window_covariance;
 
@@ -41,7 +46,7 @@ pub struct Match {
     /// Beams given.
     pub beams: u16,
     /// How well the pose explains the scan: about 1 where every beam agrees, 0 where none does, negative where the
-    /// reference saw through what the scan hit.
+    /// reference saw through what the scan hit. Each matcher has its own measure: compare scores of one matcher only.
     pub score: f32,
     /// Root mean square distance of the inliers from the reference's lines (m).
     pub residual: f32,

@@ -3,7 +3,12 @@
 //! A cell's byte is 128 + 16·ln(p/(1−p)), even; bit 0 marks a cell while a scan is inserted. 128 is unknown.
 
 use super::{Grid, cast::Ray};
-use crate::{geometry::Pose, math, scan::points::ScanPoint};
+use crate::{
+    config::{self, ConfigError},
+    geometry::Pose,
+    math,
+    scan::points::ScanPoint,
+};
 
 /// Nothing known: even odds.
 pub const UNKNOWN: u8 = 128;
@@ -75,6 +80,22 @@ impl UpdateConfig {
         miss: 6,
         max_range: 12.0,
     };
+
+    /// The same, if every setting is within its range; usable in a `const`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first setting that is not.
+    pub const fn checked(self) -> Result<Self, ConfigError> {
+        let checks = [
+            config::within("hit", self.hit as f32, 2.0, 126.0),
+            config::within("miss", self.miss as f32, 2.0, 126.0),
+            config::within("max_range", self.max_range, 0.1, 32.0),
+        ];
+        match config::all(&checks) {
+            Ok(()) => Ok(self),
+            Err(error) => Err(error),
+        }
+    }
 }
 
 impl Default for UpdateConfig {

@@ -6,6 +6,7 @@
 //! confidence), and 212 of 220 docks found, all within 3 cm.
 
 use crate::{
+    config::{self, ConfigError},
     geometry::{Point, Pose},
     matching::{
         Match, MatchError,
@@ -20,9 +21,9 @@ use crate::{
 /// Where to look, and when to believe.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PresenceConfig {
-    /// The object may be this far from the guess (m). Default 0.5.
+    /// Farthest distance of the object from the guess, along each axis (m). Default 0.5.
     pub position_range: f32,
-    /// And turned by this much (rad). Default 0.35: 20°.
+    /// Largest rotation of the object from the guess (rad). Default 0.35: 20°.
     pub heading_range: f32,
     /// Fewest beams on it. Default 15.
     pub min_beams: u16,
@@ -31,7 +32,8 @@ pub struct PresenceConfig {
     pub min_share: f32,
     /// Least share of its faces' directions, seen from here, in which a beam ends on it. Default 0.8.
     pub min_cover: f32,
-    /// It is only known from its front: seen within this angle from its x axis (rad). Default 1.05: 60°.
+    /// Largest angle between the object's x axis and the direction from which it is seen (rad): it is only known from its
+    /// front. Default 1.05: 60°.
     pub max_view_angle: f32,
     /// Largest root mean square distance of its beams from its faces (m). Default 0.02.
     pub max_residual: f32,
@@ -48,6 +50,26 @@ impl PresenceConfig {
         max_view_angle: 1.05,
         max_residual: 0.02,
     };
+
+    /// The same, if every setting is within its range; usable in a `const`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first setting that is not.
+    pub const fn checked(self) -> Result<Self, ConfigError> {
+        let checks = [
+            config::within("position_range", self.position_range, 0.0, 10.0),
+            config::within("heading_range", self.heading_range, 0.0, 3.15),
+            config::within("min_beams", self.min_beams as f32, 3.0, 65535.0),
+            config::within("min_share", self.min_share, 0.0, 1.0),
+            config::within("min_cover", self.min_cover, 0.0, 1.0),
+            config::within("max_view_angle", self.max_view_angle, 0.0, 3.15),
+            config::within("max_residual", self.max_residual, 0.0, 1.0),
+        ];
+        match config::all(&checks) {
+            Ok(()) => Ok(self),
+            Err(error) => Err(error),
+        }
+    }
 }
 
 impl Default for PresenceConfig {
@@ -78,8 +100,12 @@ pub struct Presence {
 
 /// Looks for the object whose field lies under `pyramid`, near `lidar_from_object`.
 ///
-/// `faces` are a few dozen points along what the object shows to the front, in its own frame. `Err` where the search
-/// finds nothing that could be it: absent.
+/// `faces` are a few dozen points along what the object shows to the front, in its own frame. The object is where
+/// [`Presence::present`] says so; the rest is the evidence.
+///
+/// # Errors
+/// [`MatchError`] where nothing near the guess could be the object: take it as absent, but for [`MatchError::BadGuess`] and
+/// [`MatchError::BadConfig`], which are the caller's.
 pub fn find<const N: usize>(
     correlator: &mut Correlator<N>,
     pyramid: &Pyramid<'_>,

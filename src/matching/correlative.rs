@@ -4,9 +4,6 @@
 //! pyramid of maxima bounds the score of a whole block of poses at once, so blocks that cannot win are left out, and what
 //! is found is exactly the best of all poses, whatever the guess.
 
-#[cfg(not(feature = "internals"))]
-pub(crate) mod pyramid;
-#[cfg(feature = "internals")]
 pub mod pyramid;
 pub(crate) mod rotated;
 mod search;
@@ -17,6 +14,7 @@ use super::{
     window_covariance::{AS_GOOD, REACH, WindowCovariance},
 };
 use crate::{
+    config::{self, ConfigError},
     geometry::Pose,
     math,
     scan::{
@@ -61,6 +59,26 @@ impl CorrelativeConfig {
         min_separation: 0.5,
         temper: 0.1,
     };
+
+    /// The same, if every setting is within its range; usable in a `const`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first setting that is not.
+    pub const fn checked(self) -> Result<Self, ConfigError> {
+        let checks = [
+            config::within("position_range", self.position_range, 0.0, 1000.0),
+            config::within("heading_range", self.heading_range, 0.0, 3.15),
+            config::within("heading_step", self.heading_step, 0.0, 1.0),
+            config::within("min_score", self.min_score, 0.0, 1.0),
+            config::within("max_ambiguity", self.max_ambiguity, 0.0, 10.0),
+            config::within("min_separation", self.min_separation, 0.0, 1000.0),
+            config::within("temper", self.temper, 1e-4, 1.0),
+        ];
+        match config::all(&checks) {
+            Ok(()) => Ok(self),
+            Err(error) => Err(error),
+        }
+    }
 }
 
 impl Default for CorrelativeConfig {

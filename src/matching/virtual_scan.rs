@@ -8,9 +8,8 @@ use heapless::Vec;
 
 use crate::{
     geometry::Pose,
-    matching::icp::modular::normals::same_surface,
     math,
-    scan::{Bearing, Points, ScanPoint},
+    scan::{Bearing, Points, ScanPoint, slots::Slots, surface::Gap},
 };
 
 /// The polar scan of several keyframes, in the order of bearings: what [`icp::Reference::assign`] takes.
@@ -82,7 +81,7 @@ impl<const N: usize> VirtualScan<N> {
         }
         self.points.clear();
         for (k, bin) in self.bins.iter().enumerate() {
-            if let Some(point) = bin.point(middle(k, N)) {
+            if let Some(point) = bin.point(Slots::new(N).middle(k)) {
                 // As many points as bins at most: it fits.
                 let _ = self.points.push(point);
             }
@@ -94,17 +93,6 @@ impl<const N: usize> Default for VirtualScan<N> {
     fn default() -> Self {
         Self::new()
     }
-}
-
-/// Bearing of a bin's middle.
-fn middle(bin: usize, bins: usize) -> u16 {
-    ((bin as u32).wrapping_mul(65_536) / (bins as u32).max(1)) as u16
-}
-
-/// The bin whose middle is nearest.
-fn bin_of(bearing: u16, bins: usize) -> usize {
-    let half = 32_768 / (bins as u32).max(1);
-    ((u32::from(bearing.wrapping_add(half as u16)) * bins as u32) >> 16) as usize
 }
 
 /// Adds a keyframe, `pose` as seen from the virtual lidar.
@@ -128,7 +116,7 @@ fn project(bins: &mut [Bin], points: &[ScanPoint], pose: Pose) {
         let here = place(point);
         let mut front = None;
         if let Some((last, there, last_front)) = before {
-            if same_surface(last, point) {
+            if Gap::WALL.joins_points(last, point) {
                 front = facing([last, point], [there, here]);
             }
             show(bins, there, last_front, front);
@@ -155,13 +143,13 @@ fn facing(points: [&ScanPoint; 2], seen: [Seen; 2]) -> Option<bool> {
 
 /// Enters a point between two segments: a surface if either faces the lidar, or there is none.
 fn show(bins: &mut [Bin], seen: Seen, before: Option<bool>, after: Option<bool>) {
-    let count = bins.len();
-    let at = bin_of(seen.bearing, count);
+    let slots = Slots::new(bins.len());
+    let at = slots.of(seen.bearing);
     let back = before != Some(true)
         && after != Some(true)
         && (before == Some(false) || after == Some(false));
     let range = math::sqrt(seen.x * seen.x + seen.y * seen.y);
-    let off = seen.bearing.wrapping_sub(middle(at, count)) as i16;
+    let off = seen.bearing.wrapping_sub(slots.middle(at)) as i16;
     if let Some(bin) = bins.get_mut(at) {
         bin.enter(range, off, back);
     }
@@ -169,10 +157,10 @@ fn show(bins: &mut [Bin], seen: Seen, before: Option<bool>, after: Option<bool>)
 
 /// Enters what lies between two points on one surface, where the bins are narrower than the keyframe's beams seem.
 fn fill(bins: &mut [Bin], a: Seen, b: Seen, front: bool) {
-    let count = bins.len();
+    let (count, slots) = (bins.len(), Slots::new(bins.len()));
     let turn = b.bearing.wrapping_sub(a.bearing) as i16;
     let (first, last) = if turn > 0 { (a, b) } else { (b, a) };
-    let (from, to) = (bin_of(first.bearing, count), bin_of(last.bearing, count));
+    let (from, to) = (slots.of(first.bearing), slots.of(last.bearing));
     let (dx, dy) = (last.x - first.x, last.y - first.y);
     let cross = first.x * last.y - last.x * first.y;
     let between = if to >= from {
@@ -186,7 +174,7 @@ fn fill(bins: &mut [Bin], a: Seen, b: Seen, front: bool) {
         } else {
             from + step - count
         };
-        let (s, c) = math::sin_cos_q15(middle(k, count));
+        let (s, c) = math::sin_cos_q15(slots.middle(k));
         // Where the ray meets the chord.
         let range = cross * 32_768.0 / (c as f32 * dy - s as f32 * dx);
         if let Some(bin) = bins.get_mut(k) {
@@ -287,7 +275,7 @@ mod tests {
     #[test]
     fn one_keyframe_at_its_own_place_stays_as_it_is() {
         let points: [ScanPoint; N] = core::array::from_fn(|k| {
-            let bearing = Bearing(middle(k, N));
+            let bearing = Bearing(Slots::new(N).middle(k));
             ScanPoint::at(bearing, 1000 + 7 * (k as u16 % 97))
         });
         for pose in [Pose::IDENTITY, Pose::new(3.0, -1.0, 2.0)] {

@@ -3,7 +3,10 @@
 //! A removed beam stays in its place as [`NoReturn::Filtered`], so that neither order nor times change.
 
 use super::{NoReturn, Range, Scan, Stored};
-use crate::math;
+use crate::{
+    config::{self, ConfigError},
+    math,
+};
 
 /// What to remove. The default removes nothing but shadow points.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,6 +36,23 @@ impl FilterConfig {
         min_shadow_slope: 5.67,
         max_neighbour_gap: 0.0,
     };
+
+    /// The same, if every setting is within its range; usable in a `const`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first setting that is not.
+    pub const fn checked(self) -> Result<Self, ConfigError> {
+        let checks = [
+            config::within("min_range", self.min_range, 0.0, 65.279),
+            config::within("max_range", self.max_range, self.min_range, 65.279),
+            config::within("min_shadow_slope", self.min_shadow_slope, 0.0, 1000.0),
+            config::within("max_neighbour_gap", self.max_neighbour_gap, 0.0, 65.0),
+        ];
+        match config::all(&checks) {
+            Ok(()) => Ok(self),
+            Err(error) => Err(error),
+        }
+    }
 }
 
 impl Default for FilterConfig {
@@ -131,7 +151,8 @@ impl Place {
         }
         let step = (self.bearing.wrapping_sub(other.bearing) as i16).unsigned_abs();
         let nearer = self.mm.min(other.mm);
-        // How far apart the two would be side by side, times the slope.
+        // How far apart the two would be side by side, times the slope. (A twin of `surface::across_mm`, at any slope in
+        // fractions and any angle, which 32 bits do not hold.)
         let aside = (u64::from(nearer) * u64::from(step) * u64::from(slope_q28)) >> 28;
         u64::from(self.mm.abs_diff(other.mm)) > aside
     }

@@ -1,9 +1,10 @@
 //! The places hit by a scan's beams, in the frame of one moment.
 
 use crate::{
+    config::{self, ConfigError},
     geometry::Twist,
     math,
-    scan::{Bearing, Mount, Scan, Stored},
+    scan::{Bearing, Mount, Scan, Stored, surface::across_mm},
 };
 
 /// A place hit by a beam: 8 bytes, all integers.
@@ -42,6 +43,22 @@ impl PointsConfig {
         max_range: 32.0,
         max_points: u16::MAX,
     };
+
+    /// The same, if every setting is within its range; usable in a `const`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first setting that is not.
+    pub const fn checked(self) -> Result<Self, ConfigError> {
+        let checks = [
+            config::within("min_range", self.min_range, 0.0, 32.0),
+            config::within("max_range", self.max_range, self.min_range, 32.0),
+            config::within("max_points", self.max_points as f32, 1.0, 65535.0),
+        ];
+        match config::all(&checks) {
+            Ok(()) => Ok(self),
+            Err(error) => Err(error),
+        }
+    }
 }
 
 impl Default for PointsConfig {
@@ -150,8 +167,8 @@ impl Sweep {
         let turn = last.bearing.0.wrapping_sub(first.bearing.0) as i16;
         let (steep, wide) = (u32::from(most) > MERGE_MM, u32::from(turn.unsigned_abs()));
         if steep || wide > 2000 {
-            // 2π/65536 is 25.13/2¹⁸, and the beams are that much apart in all.
-            let across = (u32::from(before) * wide.min(2000) * 25) >> 18;
+            // The beams are that much apart in all. (Not `Gap`: it is the mean step that counts here, of up to four.)
+            let across = across_mm(before, wide.min(2000) as u16);
             let steps = beams.len() as u32 - 1;
             if wide > 2000 || (u32::from(most) - MERGE_MM.min(u32::from(most))) * steps > 2 * across
             {

@@ -3,7 +3,6 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod encoders;
-mod faults;
 mod identify;
 mod noise;
 mod simulated;

@@ -12,7 +12,7 @@ use beamfix::{
             },
             minimisation::{Constrained, Minimise, PointToLine, PointToPoint},
             rejection::{
-                Boundary, Distance, Doubles, MedianMultiple, Nothing, Reject, Trimmed, Visibility,
+                Boundary, Distance, Doubles, MedianMultiple, Reject, Trimmed, Visibility,
                 WorstShare,
             },
             selection::{All, EveryNth, Features, NormalSpace, Random, Select},
@@ -339,21 +339,11 @@ fn the_fast_search_gives_the_same_bits_as_brute_force() {
     }
 }
 
-/// The fused path's choices, stage by stage.
-fn fused(
-    scale: f32,
-) -> Stages<All, Projection<BEAMS>, (RangeUncertainty, GemanMcClure), Nothing, PointToLine> {
-    Stages {
-        selection: All,
-        correspondence: Projection::new(),
+/// The fast matcher's choices with a wider kernel.
+fn fused(scale: f32) -> modular::Projective<BEAMS> {
+    modular::Projective {
         weighting: (RangeUncertainty::default(), GemanMcClure { scale }),
-        rejection: Nothing,
-        minimisation: PointToLine,
-        limits: Limits {
-            // Lines as short as the fused path's far off; with 4 one pair of the 50 below differs by 2.3 mm.
-            neighbours: 3,
-            ..Limits::DEFAULT
-        },
+        ..Stages::projective()
     }
 }
 
@@ -367,12 +357,11 @@ fn the_fused_path_is_these_stages_in_integers() {
         lines.assign(&reference);
         let a = icp::align(&lines, &current, guess, &IcpConfig::DEFAULT)
             .unwrap_or_else(|e| panic!("seed {seed}, fused: {e}"));
-        // The kernel's half weight of the last pass: 32 mm · 0.64 is 21 mm, at a scale of 32 mm.
         let b = modular::align(
             &reference,
             &current,
             guess,
-            &mut fused(0.032),
+            &mut modular::Projective::<BEAMS>::projective(),
             &mut workspace,
         )
         .unwrap_or_else(|e| panic!("seed {seed}, staged: {e}"));

@@ -5,10 +5,14 @@
 
 use super::Profile;
 use crate::{
+    config::{self, ConfigError},
     geometry::{Point, Pose},
     grid::Shape,
     math,
-    scan::points::ScanPoint,
+    scan::{
+        ScanPoint,
+        surface::{Fit, Gap},
+    },
 };
 
 /// What a scan can be drawn on.
@@ -25,27 +29,67 @@ pub trait Canvas {
 pub struct DrawConfig {
     /// Neighbours on each side that a piece is laid through. Default 3.
     pub neighbours: usize,
-    /// Two beams' ends at most this far apart always belong together (mm). Default 40.
-    pub gap_mm: u16,
+    /// Two beams' ends at most this far apart always belong together (m). Default 0.04.
+    pub max_gap: f32,
     /// And so do ends at most so many times their distance on a wall seen head-on. Default 4: 75° of incidence.
-    pub slant: u16,
-    /// A piece is laid through neighbours that lie within this of it (mm). Default 30: three times a range's σ.
-    pub straight_mm: u16,
+    pub max_slant: u16,
+    /// A piece is laid through neighbours that lie within this of it (m). Default 0.03: three times a range's σ.
+    pub max_deviation: f32,
 }
 
 impl DrawConfig {
     /// For lidars with 1 cm of range noise.
     pub const DEFAULT: Self = Self {
         neighbours: 3,
-        gap_mm: 40,
-        slant: 4,
-        straight_mm: 30,
+        max_gap: 0.04,
+        max_slant: 4,
+        max_deviation: 0.03,
     };
+
+    /// The same, if every setting is within its range; usable in a `const`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first setting that is not.
+    pub const fn checked(self) -> Result<Self, ConfigError> {
+        let checks = [
+            config::within("neighbours", self.neighbours as f32, 1.0, 64.0),
+            config::within("max_gap", self.max_gap, 0.0, 10.0),
+            config::within("max_slant", self.max_slant as f32, 0.0, 100.0),
+            config::within("max_deviation", self.max_deviation, 0.001, 1.0),
+        ];
+        match config::all(&checks) {
+            Ok(()) => Ok(self),
+            Err(error) => Err(error),
+        }
+    }
 }
 
 impl Default for DrawConfig {
     fn default() -> Self {
         Self::DEFAULT
+    }
+}
+
+/// [`DrawConfig`] in the points' unit.
+struct Limits {
+    neighbours: usize,
+    gap: Gap,
+    /// mm.
+    deviation: f32,
+}
+
+impl Limits {
+    fn of(config: &DrawConfig) -> Self {
+        Self {
+            neighbours: config.neighbours,
+            gap: Gap {
+                mm: u32::from(math::to_mm(config.max_gap)),
+                slope: u32::from(config.max_slant),
+                // 11°.
+                widest: 2048,
+            },
+            deviation: 1000.0 * config.max_deviation,
+        }
     }
 }
 
@@ -74,9 +118,10 @@ pub fn scan<C: Canvas + ?Sized>(
         return;
     }
     let half_cell = 500.0 * canvas.shape().resolution();
+    let limits = Limits::of(config);
     let mut last: Option<Piece> = None;
     for index in 0..points.len() {
-        let Some(piece) = piece(points, index, config) else {
+        let Some(piece) = piece(points, index, &limits) else {
             continue;
         };
         let near = last.is_some_and(|last| {
@@ -101,7 +146,7 @@ pub fn scan<C: Canvas + ?Sized>(
 }
 
 /// The piece around one point; `None` where there is no such point.
-fn piece(points: &[ScanPoint], index: usize, config: &DrawConfig) -> Option<Piece> {
+fn piece(points: &[ScanPoint], index: usize, limits: &Limits) -> Option<Piece> {
     let here = points.get(index)?;
     let at = |point: &ScanPoint| Point::new(f32::from(point.x), f32::from(point.y));
     let alone = Piece {
@@ -109,17 +154,18 @@ fn piece(points: &[ScanPoint], index: usize, config: &DrawConfig) -> Option<Piec
         along: Point::new(1.0, 0.0),
         half: 0.0,
     };
-    let mut reach = config.neighbours;
+    let joined = |pair: &&[ScanPoint]| matches!(pair, [a, b] if limits.gap.joins_points(a, b));
+    let mut reach = limits.neighbours;
     while reach > 0 {
         let right = points.get(..=index)?.windows(2).rev().take(reach);
         let left = points.get(index..)?.windows(2).take(reach);
-        let first = index - right.take_while(|pair| together(pair, config)).count();
-        let last = index + left.take_while(|pair| together(pair, config)).count();
+        let first = index - right.take_while(joined).count();
+        let last = index + left.take_while(joined).count();
         let run = points.get(first..=last)?;
         if run.len() < 2 {
-            return Some(slanted(points, index, config).unwrap_or(alone));
+            return Some(slanted(points, index, limits).unwrap_or(alone));
         }
-        if let Some(piece) = line_through(run, at(here), f32::from(config.straight_mm)) {
+        if let Some(piece) = line_through(run, here, limits.deviation) {
             return Some(piece);
         }
         reach /= 2;
@@ -128,78 +174,34 @@ fn piece(points: &[ScanPoint], index: usize, config: &DrawConfig) -> Option<Piec
 }
 
 /// A wall seen at so flat an angle that its beams lie far apart: the point is in line with both its neighbours.
-fn slanted(points: &[ScanPoint], index: usize, config: &DrawConfig) -> Option<Piece> {
+fn slanted(points: &[ScanPoint], index: usize, limits: &Limits) -> Option<Piece> {
     let run = points.get(index.checked_sub(1)?..=index + 1)?;
-    let here = Point::new(
-        f32::from(points.get(index)?.x),
-        f32::from(points.get(index)?.y),
-    );
-    let piece = line_through(run, here, f32::from(config.straight_mm))?;
+    let piece = line_through(run, points.get(index)?, limits.deviation)?;
     Some(Piece { half: 1.0, ..piece })
 }
 
-/// Whether two beams in a row end on the same surface.
-fn together(pair: &[ScanPoint], config: &DrawConfig) -> bool {
-    let [a, b] = pair else { return false };
-    let (dx, dy) = (
-        i32::from(a.x) - i32::from(b.x),
-        i32::from(a.y) - i32::from(b.y),
-    );
-    let apart = (b.bearing.0.wrapping_sub(a.bearing.0) as i16).unsigned_abs();
-    let range = u32::from(if a.range < b.range { a.range } else { b.range });
-    // 2π/65536 in Q24: 1609. Bearings more than 11° apart count as 11°.
-    let apart = u32::from(if apart > 2048 { 2048 } else { apart });
-    let head_on = ((range * apart) >> 8).wrapping_mul(1609) >> 16;
-    let allowed = u32::from(config.gap_mm) + u32::from(config.slant) * head_on;
-    math::isqrt((dx.wrapping_mul(dx) as u32).wrapping_add(dy.wrapping_mul(dy) as u32)) <= allowed
-}
-
-/// Least squares line through a run, cut to the part around `here`; `None` where a point is off it.
-fn line_through(run: &[ScanPoint], here: Point, straight_mm: f32) -> Option<Piece> {
-    let count = run.len() as f32;
-    let (mut mx, mut my) = (0.0, 0.0);
-    for point in run {
-        mx += f32::from(point.x);
-        my += f32::from(point.y);
-    }
-    let middle = Point::new(mx / count, my / count);
-    let off = |point: &ScanPoint| {
-        Point::new(f32::from(point.x) - middle.x, f32::from(point.y) - middle.y)
-    };
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for point in run {
-        let d = off(point);
-        xx += d.x * d.x;
-        xy += d.x * d.y;
-        yy += d.y * d.y;
-    }
-    let along = principal(xx - yy, 2.0 * xy);
+/// The line through a run, cut to the part around `here`; `None` where a point is off it.
+fn line_through(run: &[ScanPoint], here: &ScanPoint, deviation: f32) -> Option<Piece> {
+    let fit = Fit::through(run, here)?;
     let mut longest = 0.0;
     for point in run {
-        let d = off(point);
-        if math::abs(along.x * d.y - along.y * d.x) > straight_mm {
+        let place = fit.place(point, here);
+        if math::abs(place.y) > deviation {
             return None;
         }
-        longest = math::max(longest, math::abs(along.x * d.x + along.y * d.y));
+        longest = math::max(longest, math::abs(place.x));
     }
     // The point's own place on the line; the piece reaches half-way to its neighbours.
-    let foot = along.x * (here.x - middle.x) + along.y * (here.y - middle.y);
+    let foot = fit.place(here, here).x;
+    let (x, y) = (f32::from(here.x), f32::from(here.y));
     Some(Piece {
-        middle: Point::new(middle.x + foot * along.x, middle.y + foot * along.y),
-        along,
-        half: longest / (count - 1.0),
+        middle: Point::new(
+            x + fit.middle.x + foot * fit.along.x,
+            y + fit.middle.y + foot * fit.along.y,
+        ),
+        along: fit.along,
+        half: longest / (run.len() as f32 - 1.0),
     })
-}
-
-/// Unit vector at half the angle of `(x, y)`.
-fn principal(x: f32, y: f32) -> Point {
-    let norm = math::sqrt(x * x + y * y);
-    if !(norm > 0.0) {
-        return Point::new(1.0, 0.0);
-    }
-    let cosine = math::sqrt(math::max(0.5 * (1.0 + x / norm), 0.0));
-    let sine = math::sqrt(math::max(0.5 * (1.0 - x / norm), 0.0));
-    Point::new(cosine, if y < 0.0 { -sine } else { sine })
 }
 
 /// Raises the cells within the profile's reach of a piece.
@@ -262,37 +264,6 @@ mod tests {
     use crate::scan::Bearing;
 
     #[test]
-    fn half_the_angle_of_a_direction() {
-        for (x, y, expected) in [
-            (1.0, 0.0, (1.0, 0.0)),
-            (-1.0, 0.0, (0.0, 1.0)),
-            (
-                0.0,
-                1.0,
-                (
-                    core::f32::consts::FRAC_1_SQRT_2,
-                    core::f32::consts::FRAC_1_SQRT_2,
-                ),
-            ),
-            (
-                0.0,
-                -1.0,
-                (
-                    core::f32::consts::FRAC_1_SQRT_2,
-                    -core::f32::consts::FRAC_1_SQRT_2,
-                ),
-            ),
-            (0.0, 0.0, (1.0, 0.0)),
-        ] {
-            let half = principal(x, y);
-            assert!(
-                (half.x - expected.0).abs() < 1e-6 && (half.y - expected.1).abs() < 1e-6,
-                "({x}, {y}): {half:?}"
-            );
-        }
-    }
-
-    #[test]
     fn pieces_lie_on_their_wall_and_end_at_a_jump() {
         // A wall at x = 2 m, then one at 5 m: 1° apart.
         let points: heapless::Vec<ScanPoint, 16> = (-6i16..6)
@@ -303,15 +274,16 @@ mod tests {
                 ScanPoint::at(bearing, (x / c) as u16)
             })
             .collect();
+        let limits = Limits::of(&DrawConfig::DEFAULT);
         for (index, x) in [(0, 2000.0), (5, 2000.0), (6, 5000.0), (11, 5000.0)] {
             // Points are whole millimetres: 1 mm over a piece of 100 mm.
-            let piece = piece(&points, index, &DrawConfig::DEFAULT).expect("a point");
+            let piece = piece(&points, index, &limits).expect("a point");
             assert!((piece.middle.x - x).abs() < 1.5, "{index}: {piece:?}");
             assert!(
                 piece.along.x.abs() < 0.02 && piece.half > 10.0,
                 "{index}: {piece:?}"
             );
         }
-        assert_eq!(piece(&points, 12, &DrawConfig::DEFAULT), None);
+        assert_eq!(piece(&points, 12, &limits), None);
     }
 }

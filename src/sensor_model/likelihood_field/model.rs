@@ -1,4 +1,4 @@
-//! What the bytes of a likelihood field mean: the sensor's numbers, the scale of the bytes, the byte at a distance.
+//! The model behind a field's bytes: a few numbers, and the bytes by distance that follow from them.
 
 use crate::{
     config::{self, ConfigError},

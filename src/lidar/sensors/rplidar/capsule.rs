@@ -54,7 +54,6 @@ impl Parser {
 
 /// State of the capsules' parser: the capsule that waits for the next, and its time (µs).
 #[derive(Debug, Clone)]
-#[doc(hidden)]
 pub struct Format {
     base: View,
     packing: Packing,

@@ -2,7 +2,12 @@
 
 pub mod nearest;
 
-use crate::{geometry::Point, matching::icp::modular::Cloud, math, scan::ScanPoint};
+use crate::{
+    geometry::Point,
+    matching::icp::modular::Cloud,
+    math,
+    scan::{ScanPoint, slots::Slots},
+};
 use nearest::{Place, Sweep};
 
 /// Pairs a point with one of the reference.
@@ -178,11 +183,7 @@ impl<const B: usize> Projection<B> {
         }
     }
 
-    fn slot(turn: u16) -> usize {
-        // Half a slot on, so that a bearing falls to the nearest.
-        let half = 32_768 / (B as u32).max(1);
-        ((u32::from(turn.wrapping_add(half as u16)) * B as u32) >> 16) as usize
-    }
+    const SLOTS: Slots = Slots::new(B);
 }
 
 impl<const B: usize> Default for Projection<B> {
@@ -195,7 +196,7 @@ impl<const B: usize> Correspond for Projection<B> {
     fn prepare(&mut self, reference: Cloud<'_>) {
         self.table.fill(NOTHING);
         for (k, point) in reference.points.iter().enumerate() {
-            if let Some(slot) = self.table.get_mut(Self::slot(point.bearing.0)) {
+            if let Some(slot) = self.table.get_mut(Self::SLOTS.of(point.bearing.0)) {
                 *slot = k as u16;
             }
         }
@@ -203,7 +204,7 @@ impl<const B: usize> Correspond for Projection<B> {
 
     fn find(&mut self, _: Cloud<'_>, place: Point, _: [f32; 2]) -> Option<usize> {
         let place = Place::of(place);
-        let slot = Self::slot(math::atan2_turn(place.y, place.x));
+        let slot = Self::SLOTS.of(math::atan2_turn(place.y, place.x));
         let before = slot.checked_sub(1).unwrap_or(B.saturating_sub(1));
         let after = if slot + 1 < B { slot + 1 } else { 0 };
         // Beams do not fall evenly into the slots: an empty one is its neighbour's.

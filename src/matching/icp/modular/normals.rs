@@ -1,6 +1,13 @@
 //! The surface under each point of an ordered scan: total least squares over its neighbours.
 
-use crate::{geometry::Point, matching::icp::modular::Cloud, math, scan::ScanPoint};
+use crate::{
+    geometry::Point,
+    matching::icp::modular::Cloud,
+    scan::{
+        ScanPoint,
+        surface::{Fit, Gap},
+    },
+};
 
 /// A line through a point and its neighbours. 20 bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,16 +20,9 @@ pub struct Surface {
     pub edge: bool,
 }
 
-/// Root mean square distance of the points from their line beyond which it is none (m): twice the noise of a cheap
+/// Root mean square distance of the points from their line beyond which it is none (mm): twice the noise of a cheap
 /// lidar.
-const FLAT: f32 = 0.02;
-/// Two neighbours belong to one surface if they are nearer than this (m) and ...
-const GAP: f32 = 0.1;
-/// ... this many times their distance across the beams: walls down to 7° of grazing.
-const GAP_SLOPE: f32 = 8.0;
-/// Widest angle between the two (1/65536 turn): 5.5°.
-const WIDEST: u16 = 1000;
-
+const FLAT_MM: f32 = 20.0;
 impl Surface {
     /// No line.
     pub const NONE: Self = Self {
@@ -53,7 +53,7 @@ pub fn lay<'a>(points: &'a [ScanPoint], half: usize, surfaces: &'a mut [Surface]
     let mut rest = points;
     let mut room = surfaces.iter_mut();
     while !rest.is_empty() {
-        let Some((run, others)) = rest.split_at_checked(run_length(rest).max(1)) else {
+        let Some((run, others)) = rest.split_at_checked(Gap::WALL.run_length(rest).max(1)) else {
             break;
         };
         for (i, surface) in (0..run.len()).zip(room.by_ref()) {
@@ -66,28 +66,6 @@ pub fn lay<'a>(points: &'a [ScanPoint], half: usize, surfaces: &'a mut [Surface]
         points: points.get(..filled).unwrap_or_default(),
         surfaces: surfaces.get(..filled).unwrap_or_default(),
     }
-}
-
-/// Number of points from the first on that lie on one surface.
-fn run_length(points: &[ScanPoint]) -> usize {
-    let breaks = points.windows(2).position(|pair| {
-        let [a, b] = pair else { return true };
-        !same_surface(a, b)
-    });
-    breaks.map_or(points.len(), |at| at + 1)
-}
-
-/// Whether two points measured one after the other are near enough to lie on one surface.
-pub(in crate::matching) fn same_surface(a: &ScanPoint, b: &ScanPoint) -> bool {
-    let (dx, dy) = (
-        f32::from(b.x) - f32::from(a.x),
-        f32::from(b.y) - f32::from(a.y),
-    );
-    let turn = (b.bearing.0.wrapping_sub(a.bearing.0) as i16).unsigned_abs();
-    let nearer = f32::from(a.range.min(b.range));
-    let across = nearer * f32::from(turn) * (core::f32::consts::TAU / 65536.0);
-    let most = 1e3 * GAP + GAP_SLOPE * across;
-    turn < WIDEST && dx * dx + dy * dy < most * most
 }
 
 /// The surface under the `i`-th point of a run.
@@ -104,9 +82,12 @@ fn at(run: &[ScanPoint], i: usize, half: usize) -> Surface {
         span(i.saturating_sub(half), i),
         span(i, i + half),
     );
-    let flat = |points: Option<&[ScanPoint]>| Some(fit(points?, place)?).filter(|f| f.rms < FLAT);
+    let flat = |points: Option<&[ScanPoint]>| {
+        let run = points.filter(|run| run.len() > 2)?;
+        Fit::through(run, point).filter(|fit| fit.mean_square < FLAT_MM * FLAT_MM)
+    };
     let one_side = || match (flat(before), flat(after)) {
-        (Some(a), Some(b)) => Some(if a.rms < b.rms { a } else { b }),
+        (Some(a), Some(b)) => Some(if a.mean_square < b.mean_square { a } else { b }),
         (a, b) => a.or(b),
     };
     flat(centred).or_else(one_side).map_or(
@@ -116,78 +97,28 @@ fn at(run: &[ScanPoint], i: usize, half: usize) -> Surface {
             edge,
         },
         |fit| {
-            let [nx, ny] = fit.normal;
+            // Towards the lidar.
+            let Point { x: c, y: s } = fit.along;
+            let sign = if c * place.y - s * place.x > 0.0 {
+                -1.0
+            } else {
+                1.0
+            };
+            let [nx, ny] = [-s * sign, c * sign];
+            let offset = 1e-3 * (nx * fit.middle.x + ny * fit.middle.y);
             Surface {
-                foot: Point::new(place.x + nx * fit.offset, place.y + ny * fit.offset),
-                normal: fit.normal,
+                foot: Point::new(place.x + nx * offset, place.y + ny * offset),
+                normal: [nx, ny],
                 edge,
             }
         },
     )
 }
 
-struct Fit {
-    /// Unit normal towards the lidar.
-    normal: [f32; 2],
-    /// Distance of the line from the point (m), along the normal.
-    offset: f32,
-    /// Root mean square distance of the points from the line (m).
-    rms: f32,
-}
-
-/// Total least squares: the line's direction is half that of `(S_xx − S_yy, 2 S_xy)`. `None` for fewer than three points.
-fn fit(points: &[ScanPoint], place: Point) -> Option<Fit> {
-    if points.len() < 3 {
-        return None;
-    }
-    // Relative to the point, so that nothing large cancels.
-    let relative = |p: &ScanPoint| {
-        [
-            f32::from(p.x) * 1e-3 - place.x,
-            f32::from(p.y) * 1e-3 - place.y,
-        ]
-    };
-    let n = points.len() as f32;
-    let (sx, sy) = points.iter().fold((0.0, 0.0), |(x, y), p| {
-        let [dx, dy] = relative(p);
-        (x + dx, y + dy)
-    });
-    let (mx, my) = (sx / n, sy / n);
-    let (xx, xy, yy) = points.iter().fold((0.0, 0.0, 0.0), |(xx, xy, yy), p| {
-        let [dx, dy] = relative(p);
-        let (dx, dy) = (dx - mx, dy - my);
-        (xx + dx * dx, xy + dx * dy, yy + dy * dy)
-    });
-    let (a, b) = (xx - yy, 2.0 * xy);
-    let r = math::sqrt(a * a + b * b);
-    if !(r > 1e-8) {
-        return None;
-    }
-    // Half the angle of (a, b), from the half-angle formulas on the side that does not cancel.
-    let (c, s) = if a > 0.0 {
-        let c = math::sqrt(0.5 * (1.0 + a / r));
-        (c, 0.5 * b / (r * c))
-    } else {
-        let s = math::sqrt(0.5 * (1.0 - a / r));
-        (0.5 * b / (r * s), s)
-    };
-    let sign = if -s * place.x + c * place.y > 0.0 {
-        -1.0
-    } else {
-        1.0
-    };
-    let normal = [-s * sign, c * sign];
-    Some(Fit {
-        normal,
-        offset: normal[0] * mx + normal[1] * my,
-        rms: math::sqrt(math::max(0.5 * (xx + yy - r), 0.0) / n),
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan::Bearing;
+    use crate::{math, scan::Bearing};
 
     /// A wall through (2 m, 0) whose normal has direction `normal` (degrees).
     fn wall(normal: f32) -> [ScanPoint; 21] {

@@ -94,11 +94,11 @@ const REACH_MM: i32 = 4000;
 /// Which points a pass takes, and how far off they may be.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pass {
-    /// Of every so many points ...
+    /// Points in a period: of each period the same part is used.
     pub period: u16,
-    /// ... from this one on ...
+    /// First point used of a period.
     pub first: u16,
-    /// ... so many.
+    /// Points used of a period.
     pub length: u16,
     /// The gate: points farther than `4 << gate` mm from their line do not count. Half weight at 0.16 of it.
     pub gate: u8,
@@ -220,8 +220,8 @@ pub(super) struct Projection<'a> {
     y: i32,
     sin: i32,
     cos: i32,
-    /// From a point's bearing to that of its line: the turn of the pose, half a line's width, and what the last point's
-    /// line was farther on because the lidars do not stand at one place.
+    /// Offset added to a point's bearing to guess its slot: the pose's rotation, half a slot, and the parallax seen at the
+    /// previous point. (A twin of `Slots`, whose half slot is part of this sum: one addition a point less.)
     turn: u16,
     /// Half a line's width.
     half: u16,

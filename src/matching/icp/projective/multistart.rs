@@ -43,8 +43,8 @@ const LIKELY: f32 = 0.5;
 const FAR_OFF: f32 = 0.75;
 /// A second pose that is worth this share of the best makes the match ambiguous.
 const AMBIGUOUS: f32 = 0.95;
-/// Far from a guess that was called good the share is this times the score: the less a pose explains, the more may
-/// another one.
+/// In a local search that ended far from the guess, the ambiguity limit is this times the score: the less a pose explains,
+/// the likelier is another one.
 const DOUBTFUL: f32 = 1.2;
 /// What a start loses per square metre between its end and the guess: a guess is worth something.
 const NEAR_PULL: f32 = 2.5;

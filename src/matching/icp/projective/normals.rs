@@ -7,7 +7,11 @@
 use crate::{
     matching::icp::projective::reference::Line,
     math::{reciprocal, rough_length},
-    scan::ScanPoint,
+    scan::{
+        ScanPoint,
+        slots::Slots,
+        surface::{Gap, turn_between},
+    },
 };
 
 /// Half the length of wall that a line is laid through, where the points are dense enough (mm).
@@ -22,13 +26,6 @@ const FEWEST: usize = 2;
 const FLAT_MM: i32 = 22;
 /// Three points bend if the middle one is this far from the chord of the others (mm).
 const BENT_MM: i32 = 40;
-/// Two neighbours belong to one surface if their ranges differ by less than this (mm) and ...
-const GAP_MM: u32 = 100;
-/// ... this many times their distance across the beams: walls down to 7° of grazing.
-const GAP_SLOPE: u32 = 8;
-/// Widest angle between two neighbours (1/65536 turn): 5.5°.
-const GAP_TURN: u32 = 1000;
-
 /// Neighbours this many lines apart share those between.
 const WIDEST_FILL: usize = 4;
 
@@ -68,19 +65,13 @@ pub(super) fn lay(lines: &mut [Line], points: &[ScanPoint]) -> u16 {
     points.len() as u16
 }
 
-/// Number of points from the first on that lie on one surface.
+/// Number of points from the first on that lie on one surface, by their ranges: [`Gap::run_length`] by places would cost
+/// two products a point.
 fn run_length(points: &[ScanPoint]) -> usize {
     let breaks = points.windows(2).position(|pair| {
         let [a, b] = pair else { return true };
-        let turn = u32::from((b.bearing.0.wrapping_sub(a.bearing.0) as i16).unsigned_abs());
         let step = u32::from(a.range.abs_diff(b.range));
-        // Most neighbours pass here.
-        if turn > GAP_TURN || step <= GAP_MM {
-            return turn > GAP_TURN;
-        }
-        // 2π/65536 is 25.13/2¹⁸.
-        let across = (u32::from(a.range.min(b.range)) * turn * 25) >> 18;
-        step > GAP_MM + GAP_SLOPE * across
+        !Gap::WALL.joins(turn_between(a, b), a.range.min(b.range), step)
     });
     breaks.map_or(points.len(), |at| at + 1)
 }
@@ -88,9 +79,7 @@ fn run_length(points: &[ScanPoint]) -> usize {
 /// Where a bearing falls among the lines.
 #[derive(Clone, Copy)]
 struct Grid {
-    bins: u32,
-    /// Half a line's width, so that a bearing falls to the nearest line.
-    half: u16,
+    slots: Slots,
     /// Lines per radian, Q6.
     per_radian: u32,
 }
@@ -122,17 +111,15 @@ impl Density {
 
 impl Grid {
     fn new(bins: usize) -> Self {
-        let bins = bins as u32;
         // 1/2π in Q16 is 10 430.
         Self {
-            bins,
-            half: (32_768 / bins.max(1)) as u16,
-            per_radian: (bins * 10_430) >> 10,
+            slots: Slots::new(bins),
+            per_radian: (bins as u32 * 10_430) >> 10,
         }
     }
 
     fn bin(self, point: &ScanPoint) -> usize {
-        ((u32::from(point.bearing.0.wrapping_add(self.half)) * self.bins) >> 16) as usize
+        self.slots.of(point.bearing.0)
     }
 }
 
