@@ -1,5 +1,8 @@
 //! Maps of square cells over any storage: an array in RAM, a table in flash, a `Vec` on the host.
 
+#[cfg(not(feature = "internals"))]
+pub(crate) mod cast;
+#[cfg(feature = "internals")]
 pub mod cast;
 pub mod distance;
 pub mod occupancy;

@@ -12,9 +12,18 @@
 //! amount of work per call.
 
 mod config;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod hypotheses;
+#[cfg(feature = "internals")]
 pub mod hypotheses;
 pub mod presence;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod quality;
+#[cfg(feature = "internals")]
 pub mod quality;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod search;
+#[cfg(feature = "internals")]
 pub mod search;
 
 use crate::{

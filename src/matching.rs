@@ -17,7 +17,13 @@ pub mod correlative;
 mod degeneracy;
 pub mod field;
 pub mod icp;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod map;
+#[cfg(feature = "internals")]
 pub mod map;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod virtual_scan;
+#[cfg(feature = "internals")]
 pub mod virtual_scan;
 mod window_covariance;
 

@@ -34,9 +34,15 @@ impl<const N: usize> Odometry<N> {
         let prior = self.predict(ego, times);
 
         self.deskewed.assign(scan, prior.twist, &self.config.points);
+        let mut step = Step {
+            pose: prior.pose,
+            covariance: prior.covariance,
+            outcome: self.try_match(prior.pose),
+            keyframe: false,
+        };
         let mut best = Attempt {
             twist: prior.twist,
-            outcome: self.try_match(prior.pose),
+            outcome: &mut step.outcome,
         };
         if best.is_unsure() {
             self.retry_fallback(&prior, times, &mut best);
@@ -46,27 +52,24 @@ impl<const N: usize> Odometry<N> {
         }
 
         self.deskewed.pose = prior.pose;
-        (self.pose, self.covariance) = match &mut best.outcome {
-            Ok(found) => self.refine(scan, (found, best.twist), &prior, times),
-            Err(_) => {
-                self.motion
-                    .advance(prior.pose, best.twist, prior.wheel_twist, times);
-                (prior.pose, prior.covariance)
+        match &mut *best.outcome {
+            Ok(found) => {
+                let refined = self.refine(scan, (found, best.twist), &prior, times);
+                (step.pose, step.covariance) = refined;
             }
-        };
+            Err(_) => self
+                .motion
+                .advance(prior.pose, best.twist, prior.wheel_twist, times),
+        }
+        (self.pose, self.covariance) = (step.pose, step.covariance);
 
         let acceleration = math::abs(self.motion.twist.omega - last.omega) * times.duration;
-        let keyframe = self.is_keyframe(&best.outcome, acceleration);
-        if keyframe {
-            self.keep(&best.outcome);
+        step.keyframe = self.is_keyframe(&step.outcome, acceleration);
+        if step.keyframe {
+            self.keep(&step.outcome);
         }
-        self.note_outcome(&best.outcome, keyframe);
+        self.note_outcome(&step.outcome, step.keyframe);
         self.end_us = scan.end_us();
-        Step {
-            pose: self.pose,
-            covariance: self.covariance,
-            outcome: best.outcome,
-            keyframe,
-        }
+        step
     }
 }

@@ -30,12 +30,12 @@ use crate::lidar::{Packet, Protocol};
 /// The parser, one packet, and a [`Tracker`]; N is the most beams of a revolution.
 ///
 /// ```
-/// use beamfix::lidar::ld06;
+/// use beamfix::lidar::parsers;
 /// use beamfix::odometry::{Odometry, OdometryConfig};
 /// use beamfix::pipeline::{Pipeline, Revolution};
 ///
 /// let odometry = Odometry::<456>::new(OdometryConfig::DEFAULT);
-/// let mut pipeline = Pipeline::new(ld06::Parser::new(), odometry);
+/// let mut pipeline = Pipeline::new(parsers::Ldrobot::new(), odometry);
 /// pipeline.set_time(20_000); // what the board's clock says (µs)
 /// pipeline.push(&[0x54, 0x2c], &mut |revolution: Revolution<Odometry<456>, 456>| {
 ///     println!("{:?}", revolution.step.pose);

@@ -1,10 +1,28 @@
 //! One revolution of beams, and what a matcher needs of it.
 
+#[cfg(not(feature = "internals"))]
+pub(crate) mod assembler;
+#[cfg(feature = "internals")]
 pub mod assembler;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod beam;
+#[cfg(feature = "internals")]
 pub mod beam;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod decimator;
+#[cfg(feature = "internals")]
 pub mod decimator;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod filter;
+#[cfg(feature = "internals")]
 pub mod filter;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod mount;
+#[cfg(feature = "internals")]
 pub mod mount;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod points;
+#[cfg(feature = "internals")]
 pub mod points;
 pub(crate) mod slots;
 pub(crate) mod surface;

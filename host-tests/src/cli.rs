@@ -5,6 +5,7 @@ mod card;
 mod decode;
 mod field;
 mod learn;
+mod lidars;
 mod output;
 mod pairs;
 mod prior;
@@ -39,6 +40,7 @@ enum Command {
     Decode(decode::Args),
     Field(field::Args),
     Learn(learn::Args),
+    Lidars(lidars::Args),
     Bench(bench::Args),
     Card(card::Args),
     Scenes(scenes::Args),
@@ -56,6 +58,7 @@ pub fn run() -> ExitCode {
         Some(Command::Decode(args)) => decode::run(&args),
         Some(Command::Field(args)) => field::run(&args),
         Some(Command::Learn(args)) => learn::run(&args),
+        Some(Command::Lidars(args)) => lidars::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Pairs(args)) => pairs::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),

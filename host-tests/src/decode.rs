@@ -18,8 +18,8 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 pub struct Row {
     /// Revolutions begun before it.
     pub scan: u32,
-    /// When it was measured (µs, the sensor's clock where it has one).
-    pub time_us: u32,
+    /// When it was measured (µs, the sensor's clock where it has one): of a capture of any length.
+    pub time_us: u64,
     /// In the sensor's own sense (degrees).
     pub angle_deg: f32,
     /// Distance (mm), if there is one.
@@ -97,6 +97,20 @@ pub fn model(name: &str, bytes: &[u8]) -> Result<&'static Model, DecodeError> {
     }
 }
 
+/// Names of other models that `bytes` may as well be from, where `auto` chose one by the bytes alone.
+#[must_use]
+pub fn alternatives(name: &str, bytes: &[u8]) -> Vec<&'static str> {
+    if name != "auto" || capture::lidar(bytes).is_some() {
+        return Vec::new();
+    }
+    let bytes = capture::plain(bytes);
+    let start = bytes.get(..100_000).unwrap_or(&bytes);
+    let found = identify::identify(start);
+    found.map_or_else(Vec::new, |found| {
+        found.alternatives().map(|model| model.name).collect()
+    })
+}
+
 /// Decodes `bytes` of the sensor called `name`, or of the one they are from for `auto`; each measurement goes to `sink`
 /// in order. Where the bytes have times ([`capture`]), so have the measurements of sensors without a clock.
 pub fn decode(name: &str, bytes: &[u8], sink: &mut dyn FnMut(Row)) -> Result<Summary, DecodeError> {
@@ -123,6 +137,7 @@ impl WithParser for Decoding<'_> {
 
     fn run<P: Protocol>(self, mut parser: P) -> Summary {
         let mut summary = Summary::default();
+        let mut clock = Unwrapped::default();
         let pieces = capture::pieces(self.bytes);
         for (k, piece) in pieces.iter().enumerate() {
             let Content::Bytes(bytes) = piece.content else {
@@ -130,15 +145,16 @@ impl WithParser for Decoding<'_> {
             };
             if let Some(time_us) = piece.time_us {
                 parser.arrived(time_us as u32);
+                clock.near(time_us);
             }
             for &byte in bytes {
                 if let Some(packet) = parser.push(byte) {
-                    summary.take(&packet, self.is_signed, k, self.sink);
+                    summary.take(&packet, self.is_signed, k, &mut clock, self.sink);
                 }
             }
         }
         while let Some(packet) = parser.pull() {
-            summary.take(&packet, self.is_signed, pieces.len(), self.sink);
+            summary.take(&packet, self.is_signed, pieces.len(), &mut clock, self.sink);
         }
         let Counters {
             packets,
@@ -162,6 +178,7 @@ impl Summary {
         packet: &impl Packet,
         is_signed: bool,
         piece: usize,
+        clock: &mut Unwrapped,
         sink: &mut dyn FnMut(Row),
     ) {
         for (k, (sample, beam)) in packet.samples().zip(packet.beams()).enumerate() {
@@ -171,7 +188,7 @@ impl Summary {
             let turned = is_signed && sample.angle_deg >= 180.0;
             sink(Row {
                 scan: self.scans,
-                time_us: beam.time_us,
+                time_us: clock.at(beam.time_us),
                 angle_deg: sample.angle_deg - if turned { 360.0 } else { 0.0 },
                 range_mm: sample.range_mm,
                 quality: sample.quality,
@@ -180,5 +197,58 @@ impl Summary {
                 piece,
             });
         }
+    }
+}
+
+/// A clock of 32 bits (µs), which wraps after 71.6 minutes, as one of 64.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Unwrapped {
+    about_us: Option<u64>,
+    last_us: Option<u64>,
+}
+
+impl Unwrapped {
+    /// Says about when the first time will be, unless the clock has a zero of its own: then it is in its first round.
+    pub fn near(&mut self, time_us: u64) {
+        self.about_us.get_or_insert(time_us);
+    }
+
+    /// The next time, at most half a round before or after the one before it.
+    pub fn at(&mut self, time_us: u32) -> u64 {
+        /// A clock this far (µs) from when bytes came in is another one.
+        const FAR: u32 = 60_000_000;
+
+        let passed = |since: u64| time_us.wrapping_sub(since as u32) as i32;
+        let about = self
+            .about_us
+            .filter(|about| passed(*about).unsigned_abs() < FAR);
+        let now = match self.last_us.or(about) {
+            Some(since) => since.saturating_add_signed(passed(since).into()),
+            None => time_us.into(),
+        };
+        self.last_us = Some(now);
+        now
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrapped_clock_goes_on() {
+        let mut clock = Unwrapped::default();
+        let second = 1_000_000u64;
+        for now in (0..20_000).map(|k| k * second) {
+            assert_eq!(clock.at(now as u32), now);
+            // A beam may be a little earlier than the one before.
+            assert_eq!(clock.at((now + second / 2) as u32), now + second / 2);
+        }
+        let mut clock = Unwrapped::default();
+        clock.near(9_000 * second);
+        assert_eq!(clock.at((8_999 * second) as u32), 8_999 * second);
+        let mut own = Unwrapped::default();
+        own.near(9_000 * second);
+        assert_eq!(own.at(500), 500);
     }
 }

@@ -8,6 +8,7 @@ use beamfix_app::{
     telemetry::{Health, Quality, Ready, Telemetry},
 };
 
+use crate::decode::Unwrapped;
 use crate::formats::capture::{Content, Recorder, telemetry};
 use crate::report::hash::PoseHash;
 use crate::report::picture::{
@@ -46,6 +47,9 @@ pub struct Watch<W> {
     /// Bytes recorded.
     pub recorded: usize,
     clock: telemetry::Clock,
+    /// The poses' clock, which wraps after 71.6 minutes on the link.
+    pose_clock: Unwrapped,
+    pose_us: u64,
     path: Vec<[f64; 2]>,
     truth: Vec<[f64; 2]>,
     /// Beams of the revolution in progress, in the robot's frame.
@@ -80,6 +84,8 @@ impl<W: Write> Watch<W> {
             weak: 0,
             recorded: 0,
             clock: telemetry::Clock::default(),
+            pose_clock: Unwrapped::default(),
+            pose_us: 0,
             path: Vec::new(),
             truth: Vec::new(),
             revolution: Vec::new(),
@@ -119,8 +125,9 @@ impl<W: Write> Watch<W> {
             Telemetry::Ready(ready) => {
                 self.starts += 1;
                 self.ready = Some(ready);
-                // It starts from the origin again.
+                // It starts from the origin again, and so may its clock.
                 self.pose = None;
+                self.pose_clock = Unwrapped::default();
             }
             Telemetry::Pose(pose) => {
                 if let Some(last) = &self.pose {
@@ -131,6 +138,7 @@ impl<W: Write> Watch<W> {
                 self.hash.push(Pose { x, y, theta });
                 self.path.push([x.into(), y.into()]);
                 self.poses += 1;
+                self.pose_us = self.pose_clock.at(pose.time_us);
                 self.pose = Some(pose);
             }
             Telemetry::Health(health) => self.health = Some(health),
@@ -141,7 +149,7 @@ impl<W: Write> Watch<W> {
                 self.quality = Some(quality);
                 let pose = self.pose.filter(|pose| pose.sequence == quality.sequence);
                 if let (Some(file), Some(pose)) = (&mut self.qualities, pose) {
-                    writeln!(file, "{}", quality_line(&pose, &quality))?;
+                    writeln!(file, "{}", quality_line(&pose, self.pose_us, &quality))?;
                 }
             }
             Telemetry::Truth(truth) => {
@@ -262,11 +270,11 @@ impl<W: Write> Watch<W> {
 pub const QUALITY_COLUMNS: &str = "sequence,time_us,x,y,theta,verdict,score,inliers,overlap,beams,residual,xx,xy,yy,xt,yt,tt,\
     weak_x,weak_y,weak_turn,weak_sigma,iterations,starts,rival,number_1,number_2";
 
-fn quality_line(pose: &beamfix_app::telemetry::Pose, quality: &Quality) -> String {
+fn quality_line(pose: &beamfix_app::telemetry::Pose, time_us: u64, quality: &Quality) -> String {
     let [x, y, theta] = pose.pose;
     let start = format!(
-        "{},{},{x},{y},{theta},{:?}",
-        pose.sequence, pose.time_us, quality.verdict
+        "{},{time_us},{x},{y},{theta},{:?}",
+        pose.sequence, quality.verdict
     );
     let found = match &quality.found {
         Ok(found) => found,

@@ -5,7 +5,7 @@
 
 mod parameters;
 
-pub use parameters::{Correction, Flags, Parallax, Samples, Sector, Steps};
+pub use parameters::{Camsense, Correction, Flags, Parallax, Returns, Samples, Sector, Steps};
 
 /// A protocol family, with what its models differ in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub enum Family {
     RplidarUltraDense,
     /// RPLIDAR HQ packets.
     RplidarHq,
-    /// YDLIDAR point frames.
+    /// YDLIDAR point frames, and COIN-D4's.
     Ydlidar(Samples),
     /// HLS-LFCD2.
     Lds01,
@@ -34,12 +34,14 @@ pub enum Family {
     Xv11,
     /// Neato XV-11, early firmware.
     Xv11Early,
+    /// LDS-006.
+    Lds006,
     /// 3irobotix Delta.
     Delta(Sector),
-    /// Camsense X1 and LDS08RR.
-    Camsense,
-    /// COIN-D4.
-    CoinD4,
+    /// Camsense X1 and its relatives.
+    Camsense(Camsense),
+    /// LSLIDAR N10 and N10P.
+    Lslidar(Returns),
     /// Hokuyo SCIP 2.0.
     Scip(Steps),
     /// SICK LMS2xx.
@@ -51,6 +53,10 @@ impl Family {
     pub(crate) fn frames_as(self, other: Self) -> bool {
         match (self, other) {
             (Self::Ydlidar(samples), Self::Ydlidar(others)) => samples.bytes == others.bytes,
+            (Self::Camsense(kind), Self::Camsense(other)) => {
+                (kind == Camsense::T2) == (other == Camsense::T2)
+            }
+            (Self::Lslidar(returns), Self::Lslidar(others)) => returns == others,
             (Self::RplidarExpress | Self::RplidarDense, _) => {
                 matches!(other, Self::RplidarExpress | Self::RplidarDense)
             }
@@ -86,7 +92,10 @@ pub enum Start {
     /// SLAMTEC's requests: information, health, the best mode, scan.
     Rplidar,
     /// YDLIDAR's requests: information, health, scan. Sensors with one wire cannot answer and are listened to.
-    Ydlidar,
+    Ydlidar {
+        /// Whether the unit keeps the angle of its own zero, and is asked for it.
+        keeps_zero: bool,
+    },
     /// SICK's telegrams; the line begins at 9600 bits/s.
     Sick,
     /// SCIP 2.0 commands; the line begins at 19 200 bits/s.
@@ -132,9 +141,9 @@ pub struct Model {
     /// Whether the sensor's own angle grows counter-clockwise seen from above.
     pub counter_clockwise: bool,
     /// Nearest range (mm).
-    pub nearest_mm: u16,
+    pub min_range_mm: u16,
     /// Farthest range (mm).
-    pub farthest_mm: u16,
+    pub max_range_mm: u16,
     /// Who drives the motor.
     pub motor: Motor,
     /// What it must be sent before measurements come.

@@ -13,10 +13,11 @@
 use super::model::Model;
 
 pub mod camsense;
-pub mod coin_d4;
 pub mod delta;
 pub mod ld06;
+pub mod lds006;
 pub mod lds01;
+pub mod lslidar;
 pub mod rplidar;
 pub mod scip;
 pub mod sick;
@@ -32,11 +33,14 @@ impl Model {
         Self::LDROBOT_STL27L,
         Self::LDROBOT_LD14,
         Self::LDROBOT_LD14P,
+        Self::LDROBOT_LD14P_2300,
         Self::LDROBOT_LDS02,
+        Self::ORADAR_MS200,
         Self::RPLIDAR_SCAN,
         Self::RPLIDAR_EXPRESS,
         Self::RPLIDAR_DENSE,
         Self::RPLIDAR_C1,
+        Self::RPLIDAR_C1_SCAN,
         Self::RPLIDAR_ULTRA,
         Self::RPLIDAR_ULTRADENSE,
         Self::RPLIDAR_HQ,
@@ -47,17 +51,27 @@ impl Model {
         Self::YDLIDAR_TG,
         Self::YDLIDAR_TMINI,
         Self::YDLIDAR_G2,
+        Self::YDLIDAR_G4B,
+        Self::YDLIDAR_S4B,
+        Self::COIN_D4,
         Self::YDLIDAR_TMINI_SH,
         Self::HLS_LDS01,
         Self::NEATO_XV11,
         Self::XIAOMI_LDS02RR,
         Self::NEATO_XV11_EARLY,
+        Self::LDS006,
         Self::CAMSENSE_X1,
+        Self::CAMSENSE_X2,
         Self::CAMSENSE_LDS08RR,
+        Self::MYSTERY_360,
+        Self::CAMSENSE_T2,
         Self::DELTA_2A,
         Self::DELTA_2G,
-        Self::COIN_D4,
+        Self::LSLIDAR_N10,
+        Self::LSLIDAR_N10P,
         Self::HOKUYO_URG04LX,
+        Self::HOKUYO_UTM30LX,
+        Self::HOKUYO_UST10LX,
         Self::SICK_LMS200,
     ];
 
@@ -83,7 +97,7 @@ mod tests {
             let sees_all_around = !matches!(model.family, Family::Scip(_) | Family::Sick);
             let room = u32::from(model.beams_per_revolution);
             assert!(!sees_all_around || room >= per_revolution, "{}", model.name);
-            assert!(model.nearest_mm < model.farthest_mm, "{}", model.name);
+            assert!(model.min_range_mm < model.max_range_mm, "{}", model.name);
         }
     }
 }

@@ -4,6 +4,9 @@
 //! pyramid of maxima bounds the score of a whole block of poses at once, so blocks that cannot win are left out, and what
 //! is found is exactly the best of all poses, whatever the guess.
 
+#[cfg(not(feature = "internals"))]
+pub(crate) mod pyramid;
+#[cfg(feature = "internals")]
 pub mod pyramid;
 pub(crate) mod rotated;
 mod search;
@@ -23,11 +26,15 @@ use crate::{
     },
     sensor_model::likelihood_field::{Field, placement::Placement},
 };
-use pyramid::Pyramid;
+pub use pyramid::Pyramid;
 use rotated::Rotated;
+#[cfg(feature = "internals")]
 pub use rotated::sum_four;
 use search::{BLOCKS, Block};
+#[cfg(feature = "internals")]
 pub use window::{Candidate, Near, Window};
+#[cfg(not(feature = "internals"))]
+pub(crate) use window::{Candidate, Near, Window};
 
 /// Where to look, and what counts as found.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -16,7 +16,13 @@
 //! and a test (`host-tests/tests/matching/staged.rs`) holds the two together. They share the judge of degenerate directions
 //! and covariances, the question which beams lie on one surface, and [`Match`](super::Match).
 
+#[cfg(not(feature = "modular"))]
+pub(crate) mod modular;
+#[cfg(feature = "modular")]
 pub mod modular;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod projective;
+#[cfg(feature = "internals")]
 pub mod projective;
 
 pub use projective::{IcpConfig, Line, Reference, Search, align, align_observed, smooth_towards};

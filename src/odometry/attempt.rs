@@ -18,22 +18,16 @@ use crate::{
 const UNSURE: f32 = 0.6;
 
 /// The best match of a scan so far, and the velocity that the scan was deskewed with for it.
-pub(super) struct Attempt {
+pub(super) struct Attempt<'a> {
     pub twist: Twist,
-    pub outcome: Result<Match, Refusal>,
+    /// In the step that is handed on: a second copy would lie on the stack during a match.
+    pub outcome: &'a mut Result<Match, Refusal>,
 }
 
-impl Attempt {
+impl Attempt<'_> {
     /// Whether too few beams agree for the match to be relied on.
     pub fn is_unsure(&self) -> bool {
-        score(&self.outcome) < UNSURE
-    }
-
-    /// Takes another match if it explains the scan better.
-    fn improve(&mut self, twist: Twist, outcome: Result<Match, Refusal>) {
-        if score(&outcome) > score(&self.outcome) {
-            *self = Self { twist, outcome };
-        }
+        score(self.outcome) < UNSURE
     }
 }
 
@@ -43,10 +37,22 @@ fn score(outcome: &Result<Match, Refusal>) -> f32 {
 }
 
 impl<const N: usize> Odometry<N> {
-    /// Matches the scan at the fallback prior too.
+    /// Matches the scan, deskewed with `twist`, at another pose, and takes that match if it explains the scan better.
+    #[inline]
+    fn improve(&self, best: &mut Attempt, twist: Twist, predicted: Pose) {
+        let outcome = self.try_match(predicted);
+        if score(&outcome) > score(best.outcome) {
+            *best.outcome = outcome;
+            best.twist = twist;
+        }
+    }
+
+    /// Matches the scan at the fallback prior too. Apart, as the other retries are: so that a second result is on the stack
+    /// only during its own match.
+    #[inline(never)]
     pub(super) fn retry_fallback(&self, prior: &Prior, times: Times, best: &mut Attempt) {
         if let Some(guess) = self.fallback_prior(prior, times) {
-            best.improve(best.twist, self.try_match(guess));
+            self.improve(best, best.twist, guess);
         }
     }
 
@@ -54,6 +60,7 @@ impl<const N: usize> Odometry<N> {
     /// match is sure; leaves the points deskewed for the best one.
     ///
     /// Without wheels and gyroscope nothing foretells a sudden rotation, and a scan that it skewed fits nowhere.
+    #[inline(never)]
     pub(super) fn retry_turn_rates(&mut self, scan: &Scan<N>, times: Times, best: &mut Attempt) {
         /// Change of the turn rate that a step tries (rad/s²); two steps are a nimble robot's.
         const STEP: f32 = 4.0;
@@ -64,10 +71,7 @@ impl<const N: usize> Odometry<N> {
                 ..expected
             };
             self.deskewed.assign(scan, twist, &self.config.points);
-            best.improve(
-                twist,
-                self.try_match(self.pose * twist.displacement(times.seconds)),
-            );
+            self.improve(best, twist, self.pose * twist.displacement(times.seconds));
             if !best.is_unsure() {
                 break;
             }
@@ -79,6 +83,7 @@ impl<const N: usize> Odometry<N> {
 
     /// Robot pose at the scan's end, with its covariance. If the match implies another velocity than the scan was
     /// deskewed with, deskews and matches again.
+    #[inline(never)]
     pub(super) fn refine(
         &mut self,
         scan: &Scan<N>,
@@ -127,18 +132,20 @@ impl<const N: usize> Odometry<N> {
         }
         let motion = self.keyframe.pose.between(predicted);
         let guess = self.config.points.mount.lidar_motion(motion);
-        let found = icp::align(
+        let mut outcome = icp::align(
             &self.keyframe.reference,
             self.deskewed.points.as_slice(),
             guess,
             &self.config.icp,
         )
-        .map_err(Refusal::NoMatch)?;
-        let limit = self.config.max_correction * found.score;
-        match farther(guess, found.pose, limit) {
-            Some((distance, rotation)) => Err(Refusal::TooFar { distance, rotation }),
-            None => Ok(found),
+        .map_err(Refusal::NoMatch);
+        if let Ok(found) = &outcome {
+            let limit = self.config.max_correction * found.score;
+            if let Some((distance, rotation)) = farther(guess, found.pose, limit) {
+                outcome = Err(Refusal::TooFar { distance, rotation });
+            }
         }
+        outcome
     }
 
     /// Robot pose of a match, with its covariance.

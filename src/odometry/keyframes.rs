@@ -9,6 +9,7 @@ use crate::{
 impl<const N: usize> Odometry<N> {
     /// Whether later scans are to be matched against the one just placed; `acceleration` is the change of heading during
     /// it minus that during the scan before (rad).
+    #[inline(never)]
     pub(super) fn is_keyframe(&self, outcome: &Result<Match, Refusal>, acceleration: f32) -> bool {
         /// A larger change of the rotation from scan to scan (rad) skews a scan by more than its noise.
         const MAX_ACCELERATION: f32 = 0.02;
@@ -58,6 +59,7 @@ impl<const N: usize> Odometry<N> {
 
     /// Makes the scan just placed the keyframe. Where its pose is known in all directions its points are first moved
     /// towards the surfaces of the keyframe before: so errors do not add up as long as these stay in sight.
+    #[inline(never)]
     pub(super) fn keep(&mut self, outcome: &Result<Match, Refusal>) {
         let (keyframe, scan) = (&mut self.keyframe, &mut self.deskewed);
         if outcome

@@ -44,6 +44,8 @@ impl<const N: usize> Odometry<N> {
     }
 
     /// Pose and velocity that the wheels tell; without them the last velocity goes on, turned by the gyroscope.
+    /// Apart, as the other steps are: so that their memory is not on the stack during a match.
+    #[inline(never)]
     pub(super) fn predict(&self, ego: EgoMotion, times: Times) -> Prior {
         let wheels = wheel_motion(ego);
         let wheel_twist = wheels.map(|motion| Twist::from_motion(motion, times.seconds));

@@ -3,13 +3,14 @@
 /// Longest time between two messages, and from the last one to a revolution's end (µs).
 const MAX_GAP_US: i32 = 100_000;
 
-/// The rate of turn, integrated from the last revolution's end on. 20 bytes.
+/// The rate of turn, integrated from the last revolution's end on. 16 bytes.
 #[derive(Debug)]
 pub(super) struct Gyro {
-    time_us: u32,
-    /// Rate of turn at that time (rad/s); not a number before the first message.
+    /// When the last message came in (µs).
+    message_us: u32,
+    /// Rate of turn by the last message (rad/s); not a number before the first one.
     rate: f32,
-    /// Change of heading from the last revolution's end to that time (rad); not a number where that is unknown.
+    /// Change of heading from the last revolution's end to the last message (rad); not a number where that is unknown.
     rotation: f32,
     /// When the last revolution ended (µs).
     end_us: u32,
@@ -18,7 +19,7 @@ pub(super) struct Gyro {
 impl Gyro {
     pub const fn new() -> Self {
         Self {
-            time_us: 0,
+            message_us: 0,
             rate: f32::NAN,
             rotation: f32::NAN,
             end_us: 0,
@@ -31,43 +32,47 @@ impl Gyro {
             return;
         }
         // The mean of both rates over the time between them.
-        self.rotation += match self.seconds_since_last(time_us) {
-            Some(seconds) => 0.5 * (self.rate + rate) * seconds,
-            None => f32::NAN,
+        self.rotation += match after(self.message_us, time_us) {
+            0..=MAX_GAP_US => 0.5 * (self.rate + rate) * self.seconds_until(time_us),
+            _ => f32::NAN,
         };
-        (self.time_us, self.rate) = (time_us, rate);
+        (self.message_us, self.rate) = (time_us, rate);
     }
 
     /// Change of heading from the last revolution's end to this one's (µs), counter-clockwise (rad); `None` where
     /// messages are missing.
     pub fn rotation_until(&mut self, end_us: u32) -> Option<f32> {
         let stands = end_us == self.end_us;
-        self.end_us = end_us;
-        // A message of after the end has told of the next revolution already: that part is left for it.
-        let late_us = end_us.wrapping_sub(self.time_us).cast_signed();
-        let since = if (-MAX_GAP_US..=MAX_GAP_US).contains(&late_us) {
-            self.rate * (late_us as f32 * 1e-6)
-        } else {
-            f32::NAN
+        let (since, next) = match after(self.message_us, end_us) {
+            0..=MAX_GAP_US => (self.rate * self.seconds_until(end_us), 0.0),
+            // A message of after the end has told of the next revolution already: that part is left for it.
+            late_us if late_us < 0 && late_us >= -MAX_GAP_US => {
+                let rotation = self.rate * (late_us as f32 * 1e-6);
+                (rotation, -rotation)
+            }
+            _ => (f32::NAN, f32::NAN),
         };
         let rotation = self.rotation + since;
-        self.rotation = match since {
-            known if known.is_finite() && late_us >= 0 => 0.0,
-            since => -since,
-        };
-        if late_us > 0 {
-            self.time_us = end_us;
-        }
+        (self.rotation, self.end_us) = (next, end_us);
         (!stands && rotation.is_finite()).then_some(rotation)
     }
 
-    /// Time from the last message to this one (s), unless it is too long or negative.
-    fn seconds_since_last(&self, time_us: u32) -> Option<f32> {
-        let passed_us = time_us.wrapping_sub(self.time_us).cast_signed();
-        (0..=MAX_GAP_US)
-            .contains(&passed_us)
-            .then_some(passed_us as f32 * 1e-6)
+    /// Time from the last message, or from the last revolution's end if that was later, to a time (s); 0 for an earlier one.
+    fn seconds_until(&self, time_us: u32) -> f32 {
+        let since_message = after(self.message_us, time_us);
+        let since_end = after(self.end_us, time_us);
+        let since = if since_end < since_message {
+            since_end
+        } else {
+            since_message
+        };
+        if since > 0 { since as f32 * 1e-6 } else { 0.0 }
     }
+}
+
+/// Time from `before` to `time` (µs), both wrapping.
+fn after(before: u32, time: u32) -> i32 {
+    time.wrapping_sub(before).cast_signed()
 }
 
 #[cfg(test)]

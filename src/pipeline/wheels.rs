@@ -135,8 +135,8 @@ mod tests {
     fn messages_of_any_rate_tell_the_motion_of_every_revolution() {
         // Time between messages (ms), lost ones, and revolutions without a motion: those before the second message.
         for (every_ms, lost, without) in [
-            (10, None, 1),
-            (37, None, 1),
+            (10, None, 2),
+            (37, None, 2),
             (100, None, 2),
             (200, None, 3),
             (500, None, 6),

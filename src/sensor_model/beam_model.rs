@@ -3,6 +3,9 @@
 //! A mixture of a hit with noise, something unexpected in the way, no return, and anything at all. It is not
 //! smooth in the pose and takes beams as independent: use it to judge poses, not to climb.
 
+#[cfg(not(feature = "internals"))]
+pub(crate) mod learning;
+#[cfg(feature = "internals")]
 pub mod learning;
 
 use crate::config::{self, ConfigError};

@@ -5,11 +5,26 @@
 //! that ends far from all. An unexplored cell, and every place off the map, is worth `1 / z_max`; the byte
 //! that stands for this ([`Scale::unexplored`]) is reserved, so unexplored cells need no test in a sum.
 
+#[cfg(not(feature = "internals"))]
+pub(crate) mod access;
+#[cfg(feature = "internals")]
 pub mod access;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod draw;
+#[cfg(feature = "internals")]
 pub mod draw;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod model;
+#[cfg(feature = "internals")]
 pub mod model;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod placement;
+#[cfg(feature = "internals")]
 pub mod placement;
 pub mod stored;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod tiles;
+#[cfg(feature = "internals")]
 pub mod tiles;
 
 use crate::{
@@ -17,7 +32,11 @@ use crate::{
     math,
     scan::points::ScanPoint,
 };
-pub use access::{Field, Hessian, Score, Stencil};
+pub use access::{Field, Score};
+#[cfg(feature = "internals")]
+pub use access::{Hessian, Stencil};
+#[cfg(not(feature = "internals"))]
+pub(crate) use access::{Hessian, Stencil};
 pub use model::{FieldModel, Profile, Scale};
 use placement::Placement;
 

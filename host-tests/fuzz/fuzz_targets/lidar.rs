@@ -3,8 +3,8 @@
 
 use beamfix::{
     lidar::{
-        Counters, Family, Format, Model, Packet, Parser, Protocol, Verdict, camsense, coin_d4,
-        delta, ld06, lds01, rplidar, scip, sick, timing::Pace, xv11, ydlidar,
+        Counters, Family, Format, Model, Packet, Parser, Protocol, Verdict, camsense, delta, ld06,
+        lds01, lds006, lslidar, rplidar, scip, sick, timing::Pace, xv11, ydlidar,
     },
     scan::Assembler,
 };
@@ -29,8 +29,9 @@ fuzz_target!(|input: &[u8]| {
         Family::Xv11 => framed(xv11::Parser::for_model(model), bytes),
         Family::Xv11Early => framed(xv11::early::Parser::for_model(model), bytes),
         Family::Delta(_) => framed(delta::Parser::for_model(model), bytes),
-        Family::Camsense => framed(camsense::Parser::for_model(model), bytes),
-        Family::CoinD4 => framed(coin_d4::Parser::for_model(model), bytes),
+        Family::Camsense(_) => framed(camsense::Parser::for_model(model), bytes),
+        Family::Lds006 => framed(lds006::Parser::for_model(model), bytes),
+        Family::Lslidar(_) => framed(lslidar::Parser::for_model(model), bytes),
         Family::Sick => framed(sick::Parser::for_model(model), bytes),
         Family::Scip(_) => {
             stream(scip::Parser::for_model(model), bytes);

@@ -8,6 +8,7 @@ pub mod damage;
 pub mod delta;
 pub mod grid;
 pub mod ld06;
+pub mod lslidar;
 pub mod rplidar;
 pub mod rplidar_ultra;
 pub mod scip;
@@ -16,6 +17,7 @@ pub mod ydlidar;
 
 use std::f64::consts::TAU;
 
+use beamfix::lidar::model::Samples;
 use beamfix::lidar::{Family, Model};
 
 /// What a beam of a simulated sensor meets.
@@ -48,13 +50,15 @@ pub fn for_model(model: &Model) -> Box<dyn Encoder> {
         Family::RplidarUltra => turning(model, rplidar_ultra::Ultra::new()),
         Family::RplidarUltraDense => turning(model, rplidar_ultra::UltraDense::new()),
         Family::RplidarHq => turning(model, rplidar::Hq::new()),
+        Family::Ydlidar(Samples::COIN_D4) => turning(model, coin_d4::Frames::new(model)),
         Family::Ydlidar(samples) => turning(model, ydlidar::Frames::new(samples, model)),
         Family::Lds01 => turning(model, grid::Frames::lds01()),
+        Family::Lds006 => turning(model, grid::Frames::lds006()),
         Family::Xv11 => turning(model, grid::Frames::xv11()),
         Family::Xv11Early => turning(model, grid::Frames::xv11_early()),
         Family::Delta(sector) => turning(model, delta::Frames::new(sector, model)),
-        Family::Camsense => turning(model, camsense::Frames::new(model)),
-        Family::CoinD4 => turning(model, coin_d4::Frames::new(model)),
+        Family::Camsense(sensor) => turning(model, camsense::Frames::new(sensor, model)),
+        Family::Lslidar(returns) => turning(model, lslidar::Frames::new(returns)),
         Family::Scip(steps) => turning(model, scip::Scans::new(steps)),
         Family::Sick => turning(model, sick::Scans::new()),
         _ => Box::new(ld06::Sensor::for_model(model)),

@@ -17,7 +17,7 @@ use super::output;
 /// Decode a raw capture into beams, as the sensor itself gives them.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The sensor that the bytes come from.
+    /// The sensor that the bytes come from: a name that `lidars` lists, or `auto`.
     #[arg(long, value_name = "MODEL")]
     lidar: String,
     /// The capture: the sensor's bytes, a recording of `simulate`, or what a board has sent; packed with gzip or not.
@@ -46,11 +46,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let summary = decode::decode(model.name, &content.bytes, &mut |row| {
         if let (Some(csv), Ok(())) = (&mut csv, &written) {
             let range = row.range_mm.map_or(String::new(), |mm| mm.to_string());
-            let beam = row.beam.time_us;
             written = writeln!(
                 csv,
-                "{},{beam},{},{range},{}",
-                row.scan, row.angle_deg, row.quality
+                "{},{},{},{range},{}",
+                row.scan, row.time_us, row.angle_deg, row.quality
             );
         }
     })?;
@@ -83,8 +82,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         scans,
         points,
     } = summary;
+    let alternatives = decode::alternatives(&args.lidar, &content.bytes);
     let value = json!({
-        "lidar": model.name, "baud": model.baud, "hints": hints, "bytes": bytes.len(), "packets": packets, "check_errors": check_errors,
+        "lidar": model.name, "alternatives": alternatives, "baud": model.baud, "hints": hints, "bytes": bytes.len(), "packets": packets, "check_errors": check_errors,
         "skipped_bytes": skipped_bytes, "tail_bytes": tail_bytes, "scans": scans, "points": points,
     });
     let mut text = format!(
@@ -92,6 +92,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
          {skipped_bytes} bytes skipped, {tail_bytes} left at the end",
         model.name
     );
+    if !alternatives.is_empty() {
+        text += &format!(
+            "\nthe bytes may as well be from: {}",
+            alternatives.join(", ")
+        );
+    }
     for hint in &hints {
         text += &format!("\nhint: {hint}");
     }

@@ -68,8 +68,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         seed: args.seed,
         seconds: args.seconds,
         ranging: Ranging {
-            nearest: f64::from(model.nearest_mm) * 1e-3,
-            farthest: f64::from(model.farthest_mm) * 1e-3,
+            nearest: f64::from(model.min_range_mm) * 1e-3,
+            farthest: f64::from(model.max_range_mm) * 1e-3,
             ..Ranging::DEFAULT
         },
         ..Settings::DEFAULT

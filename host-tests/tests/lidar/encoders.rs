@@ -3,8 +3,7 @@
 use std::collections::HashSet;
 use std::f64::consts::TAU;
 
-use beamfix::lidar::model::Correction;
-use beamfix::lidar::model::Parallax;
+use beamfix::lidar::model::{Camsense, Correction, Parallax};
 use beamfix::lidar::{Family, Model, Packet, Protocol};
 use beamfix::scan::{Assembler, Beam};
 use beamfix_sim::encoder::{self, Echo, damage};
@@ -30,6 +29,7 @@ fn triangulates(model: &Model) -> bool {
     match model.family {
         Family::Ldrobot(parallax) => parallax != Parallax::None,
         Family::Ydlidar(samples) => samples.correction != Correction::None,
+        Family::Camsense(sensor) => matches!(sensor, Camsense::X1 | Camsense::X2),
         family => family == Family::RplidarUltra,
     }
 }
@@ -38,8 +38,9 @@ fn triangulates(model: &Model) -> bool {
 fn fire(model: &Model, beams: usize, seed: u64) -> (Vec<Fired>, Vec<u8>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let phase = rng.random_range(0.0..TAU);
-    let nearest = f64::from(model.nearest_mm).max(if triangulates(model) { 1200.0 } else { 400.0 });
-    let farthest = f64::from(model.farthest_mm).min(7000.0);
+    let nearest =
+        f64::from(model.min_range_mm).max(if triangulates(model) { 1200.0 } else { 400.0 });
+    let farthest = f64::from(model.max_range_mm).min(7000.0);
     let mut sensor = encoder::for_model(model);
     let (mut fired, mut line) = (Vec::new(), Vec::new());
     for _ in 0..beams {
@@ -96,7 +97,7 @@ fn resolution(family: Family, mm: f64) -> f64 {
         Family::RplidarUltraDense => 4.0,
         Family::RplidarExpress => 2.0,
         Family::Ydlidar(_) => 1.5,
-        Family::Ldrobot(_) => 1.1,
+        Family::Ldrobot(_) | Family::Camsense(_) => 1.1,
         // Rounded to quarters, then to whole millimetres.
         _ => 0.64,
     }
@@ -323,7 +324,7 @@ fn replayed_bytes_have_their_times() {
         let decoded = decode::decode(model.name, &file, &mut |row| times.push(row.time_us));
         assert!(decoded.expect("known").points > 6000, "{}", model.name);
         // The gap is seen, and behind it the times are right again to what a late pick-up can spoil.
-        let (first, last) = (f64::from(times[0]), f64::from(times[times.len() - 1]));
+        let (first, last) = (times[0] as f64, times[times.len() - 1] as f64);
         let expected_last = truth[truth.len() - 1];
         // The first may itself be picked up late, with a descriptor of 0.6 ms before it.
         assert!((first - truth[0]).abs() < 4000.0, "{}: {first}", model.name);
@@ -378,7 +379,7 @@ fn beams_have_the_times_at_which_they_were_measured() {
             .iter()
             .zip(&truth)
             .skip(times.len() / 4)
-            .map(|(&time_us, truth)| f64::from(time_us) - truth - zero)
+            .map(|(&time_us, truth)| time_us as f64 - truth - zero)
             .collect();
         let mean = late.iter().sum::<f64>() / late.len() as f64;
         let spread = late

@@ -1,6 +1,7 @@
 //! Which sensor is it, and what is wrong with the line.
 
 use beamfix::lidar::identify::{Hint, hints, identify};
+use beamfix::lidar::model::Camsense;
 use beamfix::lidar::{Family, Model};
 use beamfix_sim::encoder::{self, Echo, damage};
 use host_tests::shared;
@@ -29,6 +30,8 @@ fn told(family: Family) -> String {
     match family {
         Family::Ydlidar(samples) => format!("ydlidar {}", samples.bytes),
         Family::Ldrobot(_) => "ldrobot".into(),
+        Family::Camsense(sensor) => format!("camsense {}", sensor == Camsense::T2),
+        Family::RplidarDense | Family::RplidarExpress => "capsules".into(),
         family => format!("{family:?}"),
     }
 }
@@ -87,6 +90,10 @@ fn every_capture_is_recognised() {
         ("xv11-fw21-a.bin", Model::NEATO_XV11_EARLY),
         ("camsense-x1-a.bin", Model::CAMSENSE_X1),
         ("urg-04lx-md.txt", Model::HOKUYO_URG04LX),
+        ("coin-d4-first-half.bin", Model::COIN_D4),
+        ("lds006-steady-first-half.bin", Model::LDS006),
+        ("lds006-spinup-first-half.bin", Model::LDS006),
+        ("xv11-in-log-text-first-half.bin", Model::NEATO_XV11),
         ("doc-ld06-frame.bin", Model::LDROBOT_LD06),
         ("doc-delta-2a-frame.bin", Model::DELTA_2A),
     ] {
@@ -154,4 +161,88 @@ fn flow_control_in_the_recording_is_noticed() {
     };
     let bytes = std::fs::read(path).expect("readable");
     assert!(hints(&Model::LDROBOT_LD06, &bytes).any(|hint| hint == Hint::FlowControl));
+}
+
+/// Text that a person, a logger or a GPS receiver writes: of its lines one in 64 ends in SCIP's check character.
+#[test]
+fn text_is_nobodys_measurements() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let hex_dump: String = (0..4000)
+        .map(|k| {
+            let row: Vec<String> = (0..16)
+                .map(|_| format!("{:02x}", rng.random::<u8>()))
+                .collect();
+            format!("{:08x}: {}\n", 16 * k, row.join(" "))
+        })
+        .collect();
+    let positions: String = (0..4000)
+        .map(|k| {
+            let line = format!(
+                "GPGGA,{:06},4807.038,N,01131.{:03},E,1,08,0.9,545.4,M",
+                k,
+                k % 997
+            );
+            let code = line.bytes().fold(0, |a, b| a ^ b);
+            format!("${line}*{code:02X}\r\n")
+        })
+        .collect();
+    let log: String = (0..4000)
+        .map(|k| {
+            let warns = if k % 3 == 0 {
+                "warning: late by"
+            } else {
+                "took"
+            };
+            format!(
+                "[{k:>6}.{:03}] control loop {warns} {} us\n\n",
+                k % 1000,
+                k * 37 % 5003
+            )
+        })
+        .collect();
+    for (name, text) in [
+        ("hex dump", hex_dump),
+        ("positions", positions),
+        ("log", log),
+    ] {
+        let found = identify(text.as_bytes());
+        assert_eq!(found, None, "{name}");
+    }
+}
+
+/// Models that bytes cannot tell apart are all named.
+#[test]
+fn what_may_as_well_be_is_named() {
+    let names = |bytes: &[u8]| -> (String, Vec<&str>) {
+        let found = identify(bytes).expect("found");
+        let others = found.alternatives().map(|model| model.name).collect();
+        (found.model.name.into(), others)
+    };
+    for (model, expected) in [
+        (Model::LDROBOT_LD19, "ld06 ld19 stl19p ms200"),
+        (Model::LDROBOT_LD14P_2300, "ld14 ld14p-2300 lds02"),
+        (Model::LDROBOT_STL27L, "stl27l"),
+        (Model::RPLIDAR_C1_SCAN, "rplidar-c1-scan"),
+        (Model::RPLIDAR_SCAN, "rplidar-scan"),
+        (Model::RPLIDAR_C1, "rplidar-c1"),
+        (Model::RPLIDAR_DENSE, "rplidar-dense"),
+        (Model::HOKUYO_UTM30LX, "utm-30lx ust-10lx"),
+        (Model::CAMSENSE_X1, "camsense-x1"),
+        (Model::CAMSENSE_T2, "camsense-t2"),
+        (Model::MYSTERY_360, "mystery-360"),
+    ] {
+        let (found, mut others) = names(&second(&model));
+        others.push(&found);
+        others.sort_unstable();
+        let mut expected: Vec<&str> = expected.split(' ').collect();
+        expected.sort_unstable();
+        assert_eq!(others, expected, "{}", model.name);
+    }
+    if let Some(path) = shared::file("datasets/serial/ld19-20240828.bin") {
+        let (found, others) = names(&std::fs::read(path).expect("readable"));
+        assert!(
+            found == "ld19" || others.contains(&"ld19"),
+            "{found} {others:?}"
+        );
+    }
 }

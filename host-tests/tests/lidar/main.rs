@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod encoders;
+mod faults;
 mod identify;
 mod noise;
 mod simulated;

@@ -4,8 +4,8 @@ use std::collections::HashSet;
 
 use beamfix::lidar::timing::Pace;
 use beamfix::lidar::{
-    Family, Format, Model, Packet, Protocol, camsense, coin_d4, delta, ld06, lds01, rplidar, sick,
-    xv11, ydlidar,
+    Family, Format, Model, Packet, Protocol, camsense, delta, ld06, lds01, lds006, lslidar,
+    rplidar, sick, xv11, ydlidar,
 };
 use beamfix::scan::Assembler;
 use beamfix_sim::encoder::{self, Echo, Encoder, damage};
@@ -268,10 +268,18 @@ fn no_content_of_a_frame_is_too_much() {
         hammer(delta.format(), &[11], &[(3, version), (5, 0xae)]);
     }
     hammer(
-        coin_d4::Parser::for_model(&Model::COIN_D4).format(),
+        ydlidar::Parser::for_model(&Model::COIN_D4).format(),
         &[85],
         &[(3, 25)],
     );
+    hammer(
+        lds006::Parser::for_model(&Model::LDS006).format(),
+        &[22],
+        &[],
+    );
+    for (model, length) in [(Model::LSLIDAR_N10, 58), (Model::LSLIDAR_N10P, 108)] {
+        hammer(lslidar::Parser::for_model(&model).format(), &[length], &[]);
+    }
     let sick = sick::Parser::for_model(&Model::SICK_LMS200);
     hammer(sick.format(), &[7, 9, 372, 732, 812], &[(4, 0xb0)]);
 }

@@ -301,8 +301,8 @@ fn scip() {
                     }
                 }
                 let Parameters {
-                    nearest_mm,
-                    farthest_mm,
+                    min_range_mm,
+                    max_range_mm,
                     per_revolution,
                     first,
                     last,
@@ -310,8 +310,8 @@ fn scip() {
                     rpm,
                 } = parameters;
                 for (name, value) in [
-                    ("DMIN", nearest_mm),
-                    ("DMAX", farthest_mm),
+                    ("DMIN", min_range_mm),
+                    ("DMAX", max_range_mm),
                     ("ARES", per_revolution),
                     ("AMIN", first),
                     ("AMAX", last),
@@ -545,6 +545,37 @@ fn captures() {
         ("xv11-fw21-a.bin", "xv11-early", 21, 7560, 2787, 20, 0, 0),
         ("camsense-x1-a.bin", "camsense-x1", 24, 192, 136, 0, 0, 0),
         ("urg-04lx-md.txt", "scip", 1, 682, 166, 1, 0, 0),
+        ("coin-d4-first-half.bin", "coin-d4", 2, 50, 2, 0, 36, 0),
+        (
+            "lds006-steady-first-half.bin",
+            "lds006",
+            185,
+            740,
+            504,
+            2,
+            9,
+            17,
+        ),
+        (
+            "lds006-spinup-first-half.bin",
+            "lds006",
+            146,
+            0,
+            0,
+            0,
+            7,
+            15,
+        ),
+        (
+            "xv11-in-log-text-first-half.bin",
+            "xv11",
+            263,
+            1052,
+            191,
+            35,
+            57_678,
+            1,
+        ),
         ("doc-ld06-frame.bin", "ld06", 1, 12, 0, 0, 0, 0),
         ("doc-delta-2a-frame.bin", "delta-2a", 1, 47, 5, 0, 0, 0),
     ] {
@@ -552,7 +583,7 @@ fn captures() {
             continue;
         };
         let bytes = std::fs::read(path).expect("readable");
-        let (mut without, mut last_us) = (0, 0);
+        let (mut without, mut last_us) = (0, 0u64);
         let summary = decode::decode(lidar, &bytes, &mut |row| {
             without += u32::from(row.range_mm.is_none());
             assert!(

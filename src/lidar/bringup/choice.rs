@@ -4,7 +4,7 @@
 
 use crate::lidar::model::{Family, Model};
 use crate::lidar::sensors::{
-    camsense, coin_d4, delta, ld06, lds01, rplidar, scip, sick, xv11, ydlidar,
+    camsense, delta, ld06, lds01, lds006, lslidar, rplidar, scip, sick, xv11, ydlidar,
 };
 use crate::lidar::wire::protocol::Protocol;
 
@@ -29,12 +29,13 @@ pub fn with_parser<W: WithParser>(model: &Model, with: W) -> W::Output {
         Family::RplidarUltraDense => with.run(rplidar::ultra::UltraDenseParser::for_model(model)),
         Family::RplidarHq => with.run(rplidar::hq::Parser::for_model(model)),
         Family::Ydlidar(_) => with.run(ydlidar::Parser::for_model(model)),
+        Family::Lds006 => with.run(lds006::Parser::for_model(model)),
         Family::Lds01 => with.run(lds01::Parser::for_model(model)),
         Family::Xv11 => with.run(xv11::Parser::for_model(model)),
         Family::Xv11Early => with.run(xv11::early::Parser::for_model(model)),
         Family::Delta(_) => with.run(delta::Parser::for_model(model)),
-        Family::Camsense => with.run(camsense::Parser::for_model(model)),
-        Family::CoinD4 => with.run(coin_d4::Parser::for_model(model)),
+        Family::Camsense(_) => with.run(camsense::Parser::for_model(model)),
+        Family::Lslidar(_) => with.run(lslidar::Parser::for_model(model)),
         Family::Scip(_) => with.run(scip::Parser::for_model(model)),
         Family::Sick => with.run(sick::Parser::for_model(model)),
     }

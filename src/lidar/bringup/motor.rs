@@ -1,4 +1,4 @@
-//! Keeping a motor that the host drives at its speed: XV-11, Delta, RPLIDAR A1, X2, LD06 where wanted.
+//! Speed control of a motor that the host drives: XV-11, Delta, RPLIDAR A1, X2, LD06 where wanted.
 
 use core::fmt;
 
@@ -6,7 +6,7 @@ use embedded_hal::pwm::SetDutyCycle;
 
 use crate::math;
 
-/// Speed, gains and patience.
+/// Speed, gains and time limits of a motor's control.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotorConfig {
@@ -66,7 +66,7 @@ impl MotorConfig {
     };
 }
 
-/// What the motor does.
+/// State of a motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MotorState {
@@ -136,12 +136,16 @@ impl<P: SetDutyCycle> Motor<P> {
         }
     }
 
-    /// What it does.
+    /// Whether it is off, spinning up or steady.
     pub fn state(&self) -> MotorState {
         self.state
     }
 
-    /// Switches it on (time in µs, wrapping).
+    /// Switches the motor on at `now_us` (µs, wrapping).
+    ///
+    /// # Errors
+    ///
+    /// [`MotorError::Pwm`] where the PWM channel fails.
     pub fn start(&mut self, now_us: u32) -> Result<(), MotorError<P::Error>> {
         self.state = MotorState::SpinningUp;
         self.integral = self.config.initial_duty;
@@ -150,13 +154,21 @@ impl<P: SetDutyCycle> Motor<P> {
         self.drive(self.integral)
     }
 
-    /// Switches it off.
+    /// Switches the motor off.
+    ///
+    /// # Errors
+    ///
+    /// [`MotorError::Pwm`] where the PWM channel fails.
     pub fn stop(&mut self) -> Result<(), MotorError<P::Error>> {
         self.state = MotorState::Off;
         self.pwm.set_duty_cycle_fully_off().map_err(MotorError::Pwm)
     }
 
-    /// Takes a reported speed (rpm), only from frames that passed their check.
+    /// Takes a reported speed (rpm), only from frames that passed their check; sets the duty by it.
+    ///
+    /// # Errors
+    ///
+    /// [`MotorError::Pwm`] where the PWM channel fails.
     pub fn report(&mut self, now_us: u32, rpm: f32) -> Result<(), MotorError<P::Error>> {
         if self.state == MotorState::Off || !(0.0..10_000.0).contains(&rpm) {
             return Ok(());
@@ -182,9 +194,12 @@ impl<P: SetDutyCycle> Motor<P> {
         self.drive(duty)
     }
 
-    /// Watches over it; to be called now and then. An error has switched it off.
+    /// Watches over the motor; to be called now and then. Between reports the duty stays as it is.
     ///
-    /// Between reports the duty stays as it is.
+    /// # Errors
+    ///
+    /// [`MotorError::SpinUp`] where the speed was not steady in time, [`MotorError::Silent`] where nothing was reported of it,
+    /// [`MotorError::Pwm`] where the channel fails. The first two have switched the motor off.
     pub fn poll(&mut self, now_us: u32) -> Result<MotorState, MotorError<P::Error>> {
         let silent_ms = now_us.wrapping_sub(self.heard_us) / 1000;
         let since_start_ms = now_us.wrapping_sub(self.started_us) / 1000;

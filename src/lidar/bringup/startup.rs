@@ -11,6 +11,7 @@
 //!                                     one request, or nothing      all others
 //! ```
 
+mod action;
 mod config;
 mod line;
 mod query;
@@ -19,37 +20,10 @@ use crate::lidar::model::{Model, Start};
 use crate::lidar::sensors::rplidar::command::Info;
 use crate::lidar::sensors::scip::command::Parameters;
 use crate::lidar::wire::request::Request;
+pub use action::{Action, Mode};
 pub use config::{StartConfig, StartError};
 use line::Line;
 use query::Query;
-
-/// What to do next.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Action {
-    /// Send these bytes.
-    Send(Request),
-    /// Set the UART to so many bits a second, once all that was to be sent has left it.
-    SetBaud(u32),
-    /// Switch the motor on, where the host does that.
-    MotorOn,
-    /// Nothing; ask again soon.
-    Wait,
-    /// Measurements come, or will.
-    Ready(Mode),
-    /// It does not work.
-    Failed(StartError),
-}
-
-/// How the sensor was started.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Mode {
-    /// Type of the answers that stream in, by which the parser is chosen (`0x81` standard scan, `0x82` express, `0x84`
-    /// ultra, `0x85` dense, `0x86` ultra-dense); 0 for sensors with one kind.
-    pub answer: u8,
-    /// Time from one measurement to the next (µs, Q8), where the sensor told.
-    pub period_q8: Option<u32>,
-}
 
 /// How the sensor is spoken to.
 #[derive(Debug, Clone)]
@@ -107,8 +81,10 @@ impl Startup {
             talk: match model.start {
                 Start::Listen => Talk::Listen,
                 Start::Send(bytes) => Talk::Send(bytes),
-                Start::Rplidar => Talk::Query(Query::new(&query::RPLIDAR)),
-                Start::Ydlidar => Talk::Query(Query::new(&query::YDLIDAR)),
+                Start::Rplidar => Talk::Query(Query::new(&query::RPLIDAR, false)),
+                Start::Ydlidar { keeps_zero } => {
+                    Talk::Query(Query::new(&query::YDLIDAR, keeps_zero))
+                }
                 Start::Sick => Talk::Line(Line::sick(model.baud)),
                 Start::Scip => Talk::Line(Line::scip(model.baud)),
             },
@@ -123,6 +99,22 @@ impl Startup {
     pub fn info(&self) -> Option<Info> {
         match &self.talk {
             Talk::Query(query) => query.info(),
+            _ => None,
+        }
+    }
+
+    /// Angle (0.01°, `0..36000`) that looks forward by the unit's own calibration, if it keeps one and told: what
+    /// [`Model::zero_cdeg`] should be. YDLIDAR G1, G2, TG.
+    ///
+    /// A quarter of a degree a count, to be added to the sensor's angles, by the maker's driver; the answer's layout by two
+    /// versions of it. No unit was at hand.
+    #[must_use]
+    pub fn zero_cdeg(&self) -> Option<u16> {
+        match &self.talk {
+            Talk::Query(query) => {
+                let added = query.zero()?.checked_mul(25)?;
+                Some(added.wrapping_neg().rem_euclid(36_000) as u16)
+            }
             _ => None,
         }
     }
@@ -365,10 +357,36 @@ mod tests {
     }
 
     #[test]
+    fn a_unit_that_keeps_its_zero_is_asked_for_it() {
+        const AHEAD: &[u8] = &[0xa5, 0x5a, 4, 0, 0, 0, 4, 6, 0, 0, 0];
+        const BEHIND: &[u8] = &[0xa5, 0x5a, 4, 0, 0, 0, 4, 0xa6, 0xff, 0xff, 0xff];
+        for (zero, zero_cdeg) in [(AHEAD, 35_850), (BEHIND, 2250)] {
+            let mut startup = Startup::new(&Model::YDLIDAR_TG, StartConfig::DEFAULT);
+            let (end, _) = run(&mut startup, 20, |request| match request {
+                [0xa5, 0x90] => INFO_OLD,
+                [0xa5, 0x91] => GOOD,
+                [0xa5, 0x93] => zero,
+                [0xa5, 0x60] => &[0xa5, 0x5a, 5, 0, 0, 0x40, 0x81],
+                _ => &[],
+            });
+            assert!(matches!(end, Action::Ready(_)), "{end:?}");
+            assert_eq!(startup.zero_cdeg(), Some(zero_cdeg));
+        }
+        // One that does not answer starts all the same.
+        let mut startup = Startup::new(&Model::YDLIDAR_TG, StartConfig::DEFAULT);
+        assert!(matches!(
+            run(&mut startup, 20, |_| &[]),
+            (Action::Ready(_), true)
+        ));
+        assert_eq!(startup.zero_cdeg(), None);
+    }
+
+    #[test]
     fn sensors_with_one_command_get_it() {
         for (model, expected) in [
             (&Model::HLS_LDS01, &b"b"[..]),
             (&Model::LDROBOT_LD14P, &[0x54, 0xa0, 4, 0, 0, 0, 0, 0x5e]),
+            (&Model::LDS006, b"startlds$"),
             (&Model::COIN_D4, &[0xaa, 0x55, 0xf0, 0x0f]),
         ] {
             let mut startup = Startup::new(model, StartConfig::DEFAULT);

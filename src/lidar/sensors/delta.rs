@@ -36,8 +36,8 @@ impl Model {
         beams_per_revolution: 960,
         zero_cdeg: 0,
         counter_clockwise: false,
-        nearest_mm: 130,
-        farthest_mm: 8000,
+        min_range_mm: 130,
+        max_range_mm: 8000,
         motor: Motor::Pwm,
         start: Start::Listen,
         proof: Proof::Document,
@@ -57,7 +57,7 @@ impl Model {
 /// Bytes of the longest frame.
 pub const FRAME: usize = 1026;
 /// Most points that a frame is believed to have; further ones are left out.
-pub const MOST_POINTS: usize = 120;
+pub const MAX_POINTS: usize = 120;
 
 impl Sector {
     const fn cdeg(self) -> u32 {
@@ -90,6 +90,7 @@ impl Parser {
 
 /// State of the parser.
 #[derive(Debug, Clone)]
+#[doc(hidden)]
 pub struct Format {
     base: View,
     sector: Sector,
@@ -166,7 +167,7 @@ impl parser::Format for Format {
         let &[_, _, _, _, _, command, _, _, speed_q05, ..] = body else {
             return None;
         };
-        let points = points.get(..3 * MOST_POINTS).unwrap_or(points);
+        let points = points.get(..3 * MAX_POINTS).unwrap_or(points);
         let count = (points.len() / 3) as u32;
         let (mut first, mut step) = (0, 0);
         if command == 0xad {
@@ -236,7 +237,7 @@ pub struct Packet {
     /// Speed of the motor (0.05 revolutions/s).
     pub speed_q05: u8,
     view: View,
-    fan: Fan<{ 3 * MOST_POINTS }>,
+    fan: Fan<{ 3 * MAX_POINTS }>,
 }
 
 impl packet::Packet for Packet {

@@ -88,6 +88,7 @@ impl Default for Parser {
 
 /// State of the family's parser.
 #[derive(Debug, Clone)]
+#[doc(hidden)]
 pub struct Format {
     parallax: Parallax,
     base: View,

@@ -29,8 +29,8 @@ impl Model {
         beams_per_revolution: 360,
         zero_cdeg: 0,
         counter_clockwise: false,
-        nearest_mm: 120,
-        farthest_mm: 3500,
+        min_range_mm: 120,
+        max_range_mm: 3500,
         motor: Motor::Commands,
         start: Start::Send(&[START]),
         proof: Proof::Document,
@@ -49,6 +49,7 @@ pub type Parser = parser::Parser<Plain<Frames>, FRAME>;
 
 /// LDS-01 frames.
 #[derive(Debug, Clone)]
+#[doc(hidden)]
 pub struct Frames;
 
 impl Layout for Frames {

@@ -29,10 +29,10 @@ use crate::lidar::wire::timing::Pace;
 /// Good points in a row that prove the line found again.
 const SETTLED: u8 = 5;
 /// The longest answer that can stand between points: information, with its descriptor.
-const LONGEST: usize = 27;
+const MAX_ANSWER_BYTES: usize = 27;
 
 /// Push parser of the standard scan. About 150 bytes.
-pub type Parser = parser::Parser<Format, LONGEST>;
+pub type Parser = parser::Parser<Format, MAX_ANSWER_BYTES>;
 
 impl Parser {
     /// A1 and A2 at 115 200 baud.
@@ -56,6 +56,7 @@ impl Default for Parser {
 
 /// State of the standard scan's parser.
 #[derive(Debug, Clone)]
+#[doc(hidden)]
 pub struct Format {
     base: View,
     /// Good points in a row.

@@ -14,6 +14,8 @@
 //! the low six bits of the line's sum plus `0x30`. A scan with a damaged line is refused as a whole.
 
 pub mod command;
+mod survey;
+mod text;
 
 use heapless::Vec;
 
@@ -23,6 +25,9 @@ use crate::lidar::wire::packet::{self, Reading, View};
 use crate::lidar::wire::protocol::{Counters, Protocol};
 use crate::lidar::wire::survey::Survey;
 use crate::scan::NoReturn;
+use command::{Parameters, field};
+pub use text::check_character;
+use text::{MAX_LINE, checked};
 
 impl Model {
     /// Hokuyo URG-04LX: 19 200 baud after power-on; a slower line than this does not carry every scan.
@@ -35,18 +40,36 @@ impl Model {
         beams_per_revolution: 726,
         zero_cdeg: 0,
         counter_clockwise: true,
-        nearest_mm: 20,
-        farthest_mm: 5600,
+        min_range_mm: 20,
+        max_range_mm: 5600,
         motor: Motor::Own,
         start: Start::Scip,
         proof: Proof::RealBytes,
     };
+    /// Hokuyo UTM-30LX: over USB, where the speed of the line only has to be enough for 40 scans a second.
+    pub const HOKUYO_UTM30LX: Self = Self {
+        name: "utm-30lx",
+        baud: 2_000_000,
+        family: Family::Scip(Steps::UTM30LX),
+        points_per_s: 57_600,
+        revolutions_per_10s: 400,
+        beams_per_revolution: 1081,
+        min_range_mm: 100,
+        max_range_mm: 60_000,
+        proof: Proof::Document,
+        ..Self::HOKUYO_URG04LX
+    };
+    /// Hokuyo UST-10LX, UST-20LX: over Ethernet, with the same commands.
+    pub const HOKUYO_UST10LX: Self = Self {
+        name: "ust-10lx",
+        min_range_mm: 60,
+        max_range_mm: 20_000,
+        ..Self::HOKUYO_UTM30LX
+    };
 }
 
 /// Most values of a scan: those of a sensor with 270° in steps of 0.25°.
-pub const MOST_VALUES: usize = 1081;
-/// Longest line with its check character: of the fields of an answer.
-const LONGEST_LINE: usize = 80;
+pub const MAX_VALUES: usize = 1081;
 /// Values below are error codes (mm).
 const NEAREST: u16 = 20;
 
@@ -54,11 +77,13 @@ const NEAREST: u16 = 20;
 #[derive(Debug, Clone)]
 pub struct Parser {
     steps: Steps,
+    /// What the unit itself said of its steps.
+    told: Parameters,
     base: View,
-    line: Vec<u8, LONGEST_LINE>,
+    line: Vec<u8, MAX_LINE>,
     state: State,
     scan: Header,
-    values: Vec<u16, MOST_VALUES>,
+    values: Vec<u16, MAX_VALUES>,
     /// Characters of a value that goes on in the next line.
     carry: u32,
     carried: u8,
@@ -118,6 +143,7 @@ impl Parser {
                 Family::Scip(steps) => steps,
                 _ => Steps::URG04LX,
             },
+            told: Parameters::NONE,
             base: View::of(model, 0),
             line: Vec::new(),
             state: State::Echo,
@@ -146,7 +172,12 @@ impl Parser {
             },
             State::Time => self.time(&line).map(|()| State::Data),
             State::Data => self.data(&line).map(|()| State::Data),
-            State::Answer => Some(State::Answer),
+            State::Answer => {
+                if let Some((name, value)) = field(&line) {
+                    self.take_parameter(name, value);
+                }
+                Some(State::Answer)
+            }
             State::Damaged => match self.echo(&line) {
                 // The empty line may have been lost, too.
                 Some(State::Status) => Some(State::Status),
@@ -189,6 +220,9 @@ impl Parser {
         else {
             return Some(State::Damaged);
         };
+        if !self.suits(last) {
+            return Some(State::Damaged);
+        }
         self.scan = Header {
             first,
             last,
@@ -197,6 +231,37 @@ impl Parser {
             streams,
         };
         Some(State::Status)
+    }
+
+    /// How the unit counts its steps: by its own words, by what it was asked for, or by its model.
+    #[must_use]
+    pub fn steps(&self) -> Steps {
+        self.steps
+    }
+
+    /// Time from one step to the next (µs/256).
+    fn period_q8(&self) -> u32 {
+        match self.steps.period_q8() {
+            0 => self.base.period_q8,
+            period => period,
+        }
+    }
+
+    /// Takes a field of an answer; the geometry is the unit's own once it has told all of it.
+    fn take_parameter(&mut self, name: &[u8], value: &[u8]) {
+        self.told.take(name, value);
+        if let Some(steps) = self.told.steps() {
+            self.steps = steps;
+        }
+    }
+
+    /// Whether a scan up to step `last` can be this unit's: a scan that the model cannot send is another model's, and one
+    /// that no model can send is refused rather than laid out by guess.
+    fn suits(&mut self, last: u16) -> bool {
+        if last > self.steps.last && self.told.steps().is_none() && last <= Steps::UTM30LX.last {
+            self.steps = Steps::UTM30LX;
+        }
+        last <= self.steps.last
     }
 
     fn time(&mut self, line: &[u8]) -> Option<()> {
@@ -259,7 +324,7 @@ impl Parser {
         Some(Packet {
             view: View {
                 first_us: self.time_us,
-                period_q8: self.base.period_q8.saturating_mul(cluster),
+                period_q8: self.period_q8().saturating_mul(cluster),
                 revolution_start: Some(0),
                 ..self.base
             },
@@ -272,58 +337,6 @@ impl Parser {
     fn skip(&mut self, bytes: u32) {
         self.counters.skipped_bytes = self.counters.skipped_bytes.wrapping_add(bytes);
     }
-}
-
-/// A line without its check character, if that is right.
-fn checked(line: &[u8]) -> Option<&[u8]> {
-    let (code, text) = line.split_last()?;
-    (check_character(text) == *code).then_some(text)
-}
-
-/// Replies among other bytes: the echo of a command, at least three lines with right check characters, an empty line.
-///
-/// Of any text one line in 64 ends in its check character by chance; three in a row behind an echo do not.
-fn survey(bytes: &[u8]) -> Survey {
-    let mut survey = Survey::default();
-    // Bytes and good lines of the reply that is being read.
-    let mut reply: Option<(u32, u32)> = None;
-    for line in bytes.split(|byte| *byte == b'\n') {
-        let text = line.strip_suffix(b"\r").unwrap_or(line);
-        let length = line.len() as u32 + 1;
-        reply = match reply {
-            Some((bytes, lines)) if text.is_empty() => {
-                if lines >= 3 {
-                    survey.frames += 1;
-                    survey.covered_bytes += bytes + length;
-                }
-                None
-            }
-            Some((bytes, lines)) if text.len() <= LONGEST_LINE && checked(text).is_some() => {
-                Some((bytes + length, lines + 1))
-            }
-            interrupted => {
-                survey.check_errors += u32::from(interrupted.is_some());
-                is_echo(text).then_some((length, 0))
-            }
-        };
-    }
-    survey
-}
-
-/// Whether a line may be the echo of a command that asks for scans or for information.
-fn is_echo(line: &[u8]) -> bool {
-    match *line {
-        [b'M' | b'G', b'D' | b'S', ref numbers @ ..] => {
-            numbers.len() >= 10 && numbers.iter().all(u8::is_ascii_digit)
-        }
-        _ => matches!(line, b"VV" | b"PP" | b"II"),
-    }
-}
-
-/// Check character of a line.
-#[must_use]
-pub fn check_character(text: &[u8]) -> u8 {
-    (text.iter().fold(0u8, |sum, c| sum.wrapping_add(*c)) & 0x3f) + 0x30
 }
 
 fn six_bits(character: u8) -> u32 {
@@ -365,7 +378,7 @@ impl Protocol for Parser {
     }
 
     fn survey(&self, bytes: &[u8]) -> Survey {
-        survey(bytes)
+        survey::count(bytes)
     }
 }
 
@@ -375,7 +388,7 @@ pub struct Packet {
     view: View,
     first: u32,
     step: u32,
-    values: Vec<u16, MOST_VALUES>,
+    values: Vec<u16, MAX_VALUES>,
 }
 
 impl packet::Packet for Packet {

@@ -33,8 +33,8 @@ impl Model {
         beams_per_revolution: 401,
         zero_cdeg: 9000,
         counter_clockwise: true,
-        nearest_mm: 50,
-        farthest_mm: 8182,
+        min_range_mm: 50,
+        max_range_mm: 8182,
         motor: Motor::Own,
         start: Start::Sick,
         proof: Proof::Document,
@@ -44,7 +44,7 @@ impl Model {
 /// Bytes of the longest telegram.
 pub const FRAME: usize = 4 + 812 + 2;
 /// Most measurements of a telegram.
-pub const MOST_VALUES: usize = 401;
+pub const MAX_VALUES: usize = 401;
 
 /// Payload that starts the stream.
 pub const START: [u8; 2] = [0x20, 0x24];
@@ -70,6 +70,7 @@ pub type Parser = parser::Parser<Plain<Telegrams>, FRAME>;
 
 /// Telegrams of the sensor's.
 #[derive(Debug, Clone)]
+#[doc(hidden)]
 pub struct Telegrams;
 
 impl Layout for Telegrams {
@@ -93,7 +94,7 @@ impl Layout for Telegrams {
             });
         };
         let header = u16::from_le_bytes([h0, h1]);
-        let count = usize::from(header & 0x3ff).min(MOST_VALUES);
+        let count = usize::from(header & 0x3ff).min(MAX_VALUES);
         let values = values.get(..2 * count).unwrap_or(values);
         // The count says which of the sensor's fields of view and steps this is.
         let (start_cdeg, step_cdeg) = match count {
@@ -180,7 +181,7 @@ pub struct Packet {
     pub answer: u8,
     unit_q2: u8,
     view: View,
-    fan: Fan<{ 2 * MOST_VALUES }>,
+    fan: Fan<{ 2 * MAX_VALUES }>,
 }
 
 impl packet::Packet for Packet {

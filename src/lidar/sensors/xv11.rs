@@ -34,8 +34,8 @@ impl Model {
         beams_per_revolution: 360,
         zero_cdeg: 0,
         counter_clockwise: true,
-        nearest_mm: 60,
-        farthest_mm: 5000,
+        min_range_mm: 60,
+        max_range_mm: 5000,
         motor: Motor::Pwm,
         start: Start::Listen,
         proof: Proof::RealBytes,
@@ -44,8 +44,8 @@ impl Model {
     pub const XIAOMI_LDS02RR: Self = Self {
         name: "lds02rr",
         counter_clockwise: false,
-        nearest_mm: 150,
-        farthest_mm: 6000,
+        min_range_mm: 150,
+        max_range_mm: 6000,
         proof: Proof::OneSource,
         ..Self::NEATO_XV11
     };
@@ -59,6 +59,7 @@ pub type Parser = parser::Parser<Plain<Frames>, FRAME>;
 
 /// XV-11 packets.
 #[derive(Debug, Clone)]
+#[doc(hidden)]
 pub struct Frames;
 
 impl Layout for Frames {

@@ -1,6 +1,7 @@
-//! YDLIDAR: frames of up to 80 samples of two, three or four bytes.
+//! YDLIDAR and COIN-D4: frames of up to 80 samples of two, three or four bytes.
 //!
-//! Source: development manuals of the X2, X4, G2, G4, T-mini; checked against recordings and the maker's SDK.
+//! Source: development manuals of the X2, X4, G2, G4, T-mini; checked against recordings and the maker's SDK. COIN-D4: two
+//! open drivers; checked against recorded bytes.
 //!
 //! | offset | field | unit |
 //! | --- | --- | --- |
@@ -15,6 +16,7 @@
 //! The size of a sample cannot be read from a frame; it belongs to the model. A revolution starts with the frame that says so;
 //! where that one is lost, [`Assembler`](crate::scan::Assembler) notices.
 
+pub mod command;
 mod models;
 
 use crate::lidar::model::{Correction, Family, Flags, Model, Samples};
@@ -28,37 +30,9 @@ use crate::math::atan2_turn;
 use crate::scan::NoReturn;
 
 /// Most samples of a frame.
-pub const MOST_SAMPLES: usize = 80;
+pub const MAX_SAMPLES: usize = 80;
 /// Bytes of the longest frame.
-pub const FRAME: usize = 10 + 4 * MOST_SAMPLES;
-
-/// Commands; each goes behind `0xA5`, as [`request`](super::rplidar::command::request) writes it, and is answered as there.
-pub mod command {
-    /// Starts the scan.
-    pub const SCAN: u8 = 0x60;
-    /// Starts it whatever the motor does.
-    pub const FORCE_SCAN: u8 = 0x61;
-    /// Ends it.
-    pub const STOP: u8 = 0x65;
-    /// Restarts the sensor.
-    pub const RESET: u8 = 0x80;
-    /// Asks for model, firmware, serial number.
-    pub const GET_INFO: u8 = 0x90;
-    /// Asks for the health, by the manuals.
-    pub const GET_HEALTH: u8 = 0x91;
-    /// Asks for the health, by the maker's software.
-    pub const GET_HEALTH_TOO: u8 = 0x92;
-    /// A tenth of a revolution a second faster.
-    pub const FASTER: u8 = 0x09;
-    /// A tenth of a revolution a second slower.
-    pub const SLOWER: u8 = 0x0a;
-    /// A revolution a second faster.
-    pub const MUCH_FASTER: u8 = 0x0b;
-    /// A revolution a second slower.
-    pub const MUCH_SLOWER: u8 = 0x0c;
-    /// Asks for the speed.
-    pub const GET_SPEED: u8 = 0x0d;
-}
+pub const FRAME: usize = 10 + 4 * MAX_SAMPLES;
 
 /// Push parser. About 440 bytes.
 pub type Parser = parser::Parser<Format, FRAME>;
@@ -73,7 +47,7 @@ impl Parser {
         };
         let shift = match samples.flags {
             Flags::Intensity => 2,
-            _ => 0,
+            Flags::None | Flags::Doubt | Flags::Exposure => 0,
         };
         let format = Format {
             samples,
@@ -85,6 +59,7 @@ impl Parser {
 
 /// What the parser knows of its model.
 #[derive(Debug, Clone)]
+#[doc(hidden)]
 pub struct Format {
     samples: Samples,
     base: View,
@@ -105,11 +80,14 @@ impl parser::Format for Format {
         let last_q6 = u32::from(u16::from_le_bytes([b0, b1]) >> 1);
         let span = from_deg_q6(last_q6).wrapping_sub(from_deg_q6(first_q6));
         let begins = kind & 1 == 1;
-        let mut samples = [0; 4 * MOST_SAMPLES];
+        let mut samples = [0; 4 * MAX_SAMPLES];
         let target = samples.get_mut(..body.len())?;
         target.copy_from_slice(body);
         Some(Packet {
-            speed_dhz: begins.then_some(kind >> 1),
+            speed_dhz: begins.then_some(match kind >> 1 {
+                0 => 0,
+                told => told.saturating_add(self.samples.speed_offset_dhz),
+            }),
             view: View {
                 first_us: pace.first_us(count.into(), self.base.period_q8, frame.len() as u16),
                 revolution_start: begins.then_some(0),
@@ -136,7 +114,7 @@ fn judge(bytes: &[u8], sample_bytes: u8) -> Verdict {
             Some(_) => Verdict::No,
         },
         [0xaa, 0x55] | [0xaa, 0x55, _] => Verdict::Need(4),
-        [0xaa, 0x55, _, count, ..] if (1..=MOST_SAMPLES as u8).contains(&count) => {
+        [0xaa, 0x55, _, count, ..] if (1..=MAX_SAMPLES as u8).contains(&count) => {
             let length = 10 + usize::from(count) * usize::from(sample_bytes);
             Verdict::on(bytes, length, |frame| check_code(frame, sample_bytes) == 0)
         }
@@ -176,7 +154,7 @@ pub struct Packet {
     first: u32,
     step: u32,
     bytes: u16,
-    samples: [u8; 4 * MOST_SAMPLES],
+    samples: [u8; 4 * MAX_SAMPLES],
 }
 
 impl packet::Packet for Packet {
@@ -224,6 +202,7 @@ impl Samples {
                     Flags::None => (word, first.into(), 0),
                     Flags::Intensity => (word & !3, u16::from_le_bytes([first, flags]), 0),
                     Flags::Doubt => (word & !3, first.into(), flags),
+                    Flags::Exposure => (word & !3, u16::from(flags << 6 | first >> 2), 0),
                 }
             }
             [i0, i1, low, high] => (

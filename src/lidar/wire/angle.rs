@@ -48,12 +48,6 @@ pub(crate) const fn from_deg_q6(q6: u32) -> u32 {
     q6.wrapping_mul(186_413).wrapping_add(q6 >> 1)
 }
 
-/// 1/128 degrees as a fraction of 2³².
-pub(crate) const fn from_deg_q7(q7: u32) -> u32 {
-    q7.wrapping_mul(93_206)
-        .wrapping_add((q7.wrapping_mul(193)) >> 8)
-}
-
 /// `span`, a fraction of 2³², divided into `parts`; 0 for none.
 pub(crate) const fn divided(span: u32, parts: u32) -> u32 {
     match span.checked_div(parts) {
@@ -75,10 +69,6 @@ mod tests {
         for q6 in 0..23_040u32 {
             let exact = f64::from(q6) / 23_040.0 * 4_294_967_296.0;
             assert!((f64::from(from_deg_q6(q6)) - exact).abs() < 600.0, "{q6}");
-        }
-        for q7 in 0..46_080u32 {
-            let exact = f64::from(q7) / 46_080.0 * 4_294_967_296.0;
-            assert!((f64::from(from_deg_q7(q7)) - exact).abs() < 600.0, "{q7}");
         }
         assert_eq!(
             (from_cdeg(36_000) >> 8, from_deg_q6(23_040) >> 9),

@@ -9,7 +9,7 @@ pub(crate) fn judge(bytes: &[u8]) -> Verdict {
     };
     let (length, mode) = (u32::from_le_bytes([l0, l1, l2, l3 & 0x3f]), l3 >> 6);
     let whole = match (mode, kind, length) {
-        (0, 0x04, 20) | (0, 0x06, 3) | (0, 0x15, 4) | (0, 0xff, 4) => 7 + length as usize,
+        (0, 0x04, 20 | 4) | (0, 0x06, 3) | (0, 0x15, 4) | (0, 0xff, 4) => 7 + length as usize,
         (1, 0x81, 5) | (1, 0x82 | 0x85, 84) | (1, 0x83, 781 | 132) => 7,
         (1, 0x84, 132) | (1, 0x86, 170) => 7,
         _ => return Verdict::No,

@@ -12,7 +12,7 @@
 use super::protocol::Protocol;
 
 /// UART errors in a row after which the line counts as broken.
-pub const ERRORS_IN_A_ROW: u8 = 32;
+pub const MAX_ERRORS_IN_A_ROW: u8 = 32;
 
 /// A UART and the parser of what comes in there. At most 40 bytes more than the two.
 #[derive(Debug)]
@@ -105,7 +105,7 @@ impl<S, P: Protocol> Reader<S, P> {
     fn note_error<E>(&mut self, error: E) -> Option<E> {
         self.line_errors = self.line_errors.wrapping_add(1);
         self.errors_in_a_row += 1;
-        if self.errors_in_a_row < ERRORS_IN_A_ROW {
+        if self.errors_in_a_row < MAX_ERRORS_IN_A_ROW {
             return None;
         }
         self.errors_in_a_row = 0;
@@ -117,7 +117,9 @@ impl<S, P: Protocol> Reader<S, P> {
 impl<S: embedded_io::Read, P: Protocol> Reader<S, P> {
     /// Blocks until a packet is complete; `None` at the end of a stream that has one.
     ///
-    /// Fails with the UART's last error after [`ERRORS_IN_A_ROW`] without a byte between them.
+    /// # Errors
+    ///
+    /// The UART's last error, after [`MAX_ERRORS_IN_A_ROW`] without a byte between them.
     pub fn read_packet(&mut self) -> Result<Option<P::Packet>, S::Error> {
         loop {
             let packet = self.parse_buffered();
@@ -136,8 +138,11 @@ impl<S: embedded_io::Read, P: Protocol> Reader<S, P> {
 impl<S: embedded_io_async::Read, P: Protocol> Reader<S, P> {
     /// Waits until a packet is complete; `None` at the end of a stream that has one.
     ///
-    /// Fails with the UART's last error after [`ERRORS_IN_A_ROW`] without a byte between them. May be dropped and
-    /// called again where the UART's own `read` may.
+    /// May be dropped and called again where the UART's own `read` may.
+    ///
+    /// # Errors
+    ///
+    /// The UART's last error, after [`MAX_ERRORS_IN_A_ROW`] without a byte between them.
     pub async fn read_packet_async(&mut self) -> Result<Option<P::Packet>, S::Error> {
         loop {
             let packet = self.parse_buffered();
@@ -154,9 +159,12 @@ impl<S: embedded_io_async::Read, P: Protocol> Reader<S, P> {
 
 #[cfg(feature = "embedded-hal-nb")]
 impl<S: embedded_hal_nb::serial::Read, P: Protocol> Reader<S, P> {
-    /// Takes the bytes that are there; `WouldBlock` when they complete no packet.
+    /// Takes the bytes that are there.
     ///
-    /// Fails with the UART's last error after [`ERRORS_IN_A_ROW`] without a byte between them.
+    /// # Errors
+    ///
+    /// `WouldBlock` when they complete no packet; the UART's last error, after [`MAX_ERRORS_IN_A_ROW`] without a byte
+    /// between them.
     pub fn poll_packet(&mut self) -> embedded_hal_nb::nb::Result<P::Packet, S::Error> {
         use embedded_hal_nb::nb;
         loop {
@@ -253,6 +261,6 @@ mod tests {
             broken.poll_packet(),
             Err(nb::Error::Other(serial::ErrorKind::Overrun))
         );
-        assert_eq!(broken.line_errors(), u32::from(ERRORS_IN_A_ROW));
+        assert_eq!(broken.line_errors(), u32::from(MAX_ERRORS_IN_A_ROW));
     }
 }

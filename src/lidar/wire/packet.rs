@@ -39,6 +39,18 @@ pub struct Sample {
     pub quality: u16,
 }
 
+impl Sample {
+    /// The reading in degrees and millimetres.
+    pub(crate) fn of(reading: Reading) -> Self {
+        Self {
+            // 24 bits, which f32 holds: less than a turn stays less than 360.
+            angle_deg: (reading.angle >> 8) as f32 * (360.0 / 16_777_216.0),
+            range_mm: reading.range.ok().map(|quarters| quarters as f32 * 0.25),
+            quality: reading.quality,
+        }
+    }
+}
+
 /// How a packet's readings become beams: direction, sense and time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -110,14 +122,9 @@ pub trait Packet {
         })
     }
 
-    /// As the sensor itself gives them, in the same order.
+    /// As the sensor itself gives them, in the same order: where a maker corrects the angle on the host only, before that.
     fn samples(&self) -> impl Iterator<Item = Sample> + '_ {
-        self.readings().map(|reading| Sample {
-            // 24 bits, which f32 holds: less than a turn stays less than 360.
-            angle_deg: (reading.angle >> 8) as f32 * (360.0 / 16_777_216.0),
-            range_mm: reading.range.ok().map(|quarters| quarters as f32 * 0.25),
-            quality: reading.quality,
-        })
+        self.readings().map(Sample::of)
     }
 
     /// Speed of the motor (rpm), where the frame tells.

@@ -1,46 +1,81 @@
-//! Camsense X1 and LDS08RR frames.
+//! Frames of Camsense sensors and their relatives.
+
+use std::f64::consts::TAU;
 
 use beamfix::lidar::Model;
+use beamfix::lidar::model::Camsense;
 
 use super::{Shot, Wire, fold, grid, q6};
 
-/// Frames of 8 or 12 points.
+/// Frames of 8, 12 or 16 points.
 #[derive(Debug)]
 pub struct Frames {
-    /// LDS08RR: 12 points, quality of 16 bits.
-    is_wide: bool,
+    sensor: Camsense,
+    kind: u8,
+    points: usize,
     speed_rpm_q6: u16,
     shots: Vec<Shot>,
 }
 
 impl Frames {
-    /// Frames of the Camsense X1 or the LDS08RR.
+    /// Frames of one of the family's models.
     #[must_use]
-    pub fn new(model: &Model) -> Self {
+    pub fn new(sensor: Camsense, model: &Model) -> Self {
+        let (kind, points) = match model.name {
+            "lds08rr" => (7, 12),
+            "mystery-360" => (0x23, 16),
+            _ => (3, 8),
+        };
         Self {
-            is_wide: model.name == "lds08rr",
+            sensor,
+            kind,
+            points,
             speed_rpm_q6: model.revolutions_per_10s * 6 * 64,
             shots: Vec::new(),
         }
     }
+
+    /// Distance between laser and receiver (mm).
+    fn baseline(&self) -> f64 {
+        match self.sensor {
+            Camsense::X1 => 20.0,
+            Camsense::X2 => 17.92,
+            _ => 0.0,
+        }
+    }
+
+    fn angle(&self, shot: &Shot) -> [u8; 2] {
+        match self.sensor {
+            Camsense::T2 => ((shot.angle * 36_000.0).round() as u32 % 36_000) as u16,
+            _ => q6(shot.angle) + 0xa000,
+        }
+        .to_le_bytes()
+    }
 }
 
 impl Wire for Frames {
+    /// The middle of the sensor, the laser beside it and the place that it hits make a right angle at the laser.
+    fn shift(&self, mm: f64) -> f64 {
+        (self.baseline() / mm.max(40.0)).asin() / TAU
+    }
+
     fn add(&mut self, shot: Shot, line: &mut Vec<u8>) {
         self.shots.push(shot);
-        let (kind, points) = if self.is_wide { (7, 12) } else { (3, 8) };
-        if self.shots.len() < points {
+        if self.shots.len() < self.points {
             return;
         }
-        let angle = |shot: &Shot| (q6(shot.angle) + 0xa000).to_le_bytes();
-        let mut frame = vec![0x55, 0xaa, kind, points as u8];
+        let mut frame = vec![0x55, 0xaa, self.kind, self.points as u8];
         frame.extend(self.speed_rpm_q6.to_le_bytes());
-        frame.extend(angle(&self.shots[0]));
-        let last = angle(&self.shots[points - 1]);
+        frame.extend(self.angle(&self.shots[0]));
+        let last = self.angle(&self.shots[self.points - 1]);
+        let baseline = self.baseline();
+        // The Mystery 360 calls every point weak.
+        let weak = if self.kind == 0x23 { 0x4000 } else { 0 };
         for shot in self.shots.drain(..) {
-            frame.extend(grid::word(shot.mm).to_le_bytes());
+            let mm = (shot.mm * shot.mm - baseline * baseline).max(0.0).sqrt();
+            frame.extend((grid::word(mm) | weak).to_le_bytes());
             frame.push(shot.intensity);
-            if self.is_wide {
+            if self.kind == 7 {
                 frame.push(0);
             }
         }

@@ -1,4 +1,4 @@
-//! Sensors with a point for each degree: XV-11 and LDS02RR, the XV-11's early firmware, LDS-01.
+//! Sensors with a point for each degree: XV-11 and LDS02RR, the XV-11's early firmware, LDS-006, LDS-01.
 
 use beamfix::lidar::Model;
 
@@ -9,6 +9,7 @@ use super::{Shot, Sweep, Wire, fold};
 enum Kind {
     Xv11,
     Xv11Early,
+    Lds006,
     Lds01,
 }
 
@@ -34,6 +35,15 @@ impl Frames {
     pub fn xv11_early() -> Self {
         Self {
             kind: Kind::Xv11Early,
+            ..Self::xv11()
+        }
+    }
+
+    /// 22 bytes for 4 degrees, summed.
+    #[must_use]
+    pub fn lds006() -> Self {
+        Self {
+            kind: Kind::Lds006,
             ..Self::xv11()
         }
     }
@@ -69,7 +79,7 @@ impl Wire for Frames {
     fn add(&mut self, shot: Shot, line: &mut Vec<u8>) {
         self.shots.push(shot);
         let points = match self.kind {
-            Kind::Xv11 => 4,
+            Kind::Xv11 | Kind::Lds006 => 4,
             Kind::Lds01 => 6,
             Kind::Xv11Early => 360,
         };
@@ -84,6 +94,7 @@ impl Wire for Frames {
                 &(300u16 * 64).to_le_bytes()[..],
             ]
             .concat(),
+            Kind::Lds006 => [&[0xfa, 0xa0 + index as u8], &30_000u16.to_le_bytes()[..]].concat(),
             Kind::Lds01 => [&[0xfa, 0xa0 + index as u8], &3000u16.to_le_bytes()[..]].concat(),
             Kind::Xv11Early => vec![0x5a, 0xa5, 0x00, 0xc0, 0x98, 0xd1],
         };
@@ -100,6 +111,10 @@ impl Wire for Frames {
         }
         match self.kind {
             Kind::Xv11 => frame.extend(fold(&frame).to_le_bytes()),
+            Kind::Lds006 => {
+                let sum = frame.iter().map(|byte| u16::from(*byte)).sum::<u16>();
+                frame.extend(sum.to_le_bytes());
+            }
             Kind::Lds01 => {
                 let sum = frame.iter().map(|byte| u32::from(*byte)).sum::<u32>();
                 frame.extend([255 - (sum & 255) as u8; 2]);

@@ -22,7 +22,8 @@ impl Frames {
     pub fn new(samples: Samples, model: &Model) -> Self {
         Self {
             samples,
-            speed_dhz: model.revolutions_per_10s.min(127) as u8,
+            speed_dhz: (model.revolutions_per_10s - u16::from(samples.speed_offset_dhz)).min(127)
+                as u8,
             shots: Vec::new(),
             last: 1.0,
         }

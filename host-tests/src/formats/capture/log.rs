@@ -21,6 +21,8 @@ pub struct Revolution {
     pub beams: Vec<Beam>,
     /// Whether it had more.
     pub is_thinned: bool,
+    /// When its last beam was measured (µs), of a capture of any length.
+    pub end_us: u64,
     /// Beams of the stream up to and with its last one.
     pub ends_at: usize,
     /// Number of the capture's piece whose bytes completed it.
@@ -39,7 +41,7 @@ pub fn revolutions(lidar: &str, stream: &[u8]) -> Result<(Vec<Revolution>, Summa
     let mut assembler = Box::new(Assembler::<ROOM>::new());
     // The beams since the last revolution, with their times to the microsecond.
     let mut recent: Vec<Beam> = Vec::new();
-    let mut count = 0;
+    let (mut count, mut last_us) = (0, 0);
     let summary = decode::decode(lidar, stream, &mut |row| {
         if assembler.push(row.beam, row.revolution_starts) {
             let first = recent.len().saturating_sub(assembler.scan().len());
@@ -47,6 +49,7 @@ pub fn revolutions(lidar: &str, stream: &[u8]) -> Result<(Vec<Revolution>, Summa
             revolutions.push(Revolution {
                 is_thinned: beams.len() > MOST_BEAMS,
                 beams: thinned(beams, MOST_BEAMS),
+                end_us: last_us,
                 ends_at: count,
                 piece: row.piece,
                 wheels: None,
@@ -54,6 +57,7 @@ pub fn revolutions(lidar: &str, stream: &[u8]) -> Result<(Vec<Revolution>, Summa
             recent.clear();
         }
         recent.push(row.beam);
+        last_us = row.time_us;
         count += 1;
     })?;
     let mut wheels = capture::pieces(stream)
@@ -130,7 +134,7 @@ pub fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Result<Log
     log.scans = revolutions
         .into_iter()
         .map(|revolution| {
-            let us = revolution.beams.last().map_or(0, |beam| beam.time_us);
+            let us = revolution.end_us;
             Recorded {
                 stamp: format!("{}.{:06}", us / 1_000_000, us % 1_000_000),
                 wheels: revolution.wheels,

@@ -8,7 +8,8 @@
 //! The fast line comes first: after a restart of the robot alone, the sensor is still on it, and one behind USB does
 //! not care.
 
-use super::{Action, StartConfig, StartError};
+use super::action::Action;
+use super::config::{StartConfig, StartError};
 use crate::lidar::sensors::scip::command::{self, Parameters, Part, Replies};
 use crate::lidar::sensors::sick;
 use crate::lidar::wire::framing::{Framer, Verdict};
@@ -275,7 +276,7 @@ mod tests {
             assert!(matches!(end, Action::Ready(_)), "{baud}: {end:?}");
             assert_eq!((&last[..], now), (&b"MD0044072501000\n"[..], 750_000));
             let parameters = startup.parameters().expect("told");
-            assert_eq!((parameters.farthest_mm, parameters.rpm), (5600, 600));
+            assert_eq!((parameters.max_range_mm, parameters.rpm), (5600, 600));
         }
     }
 

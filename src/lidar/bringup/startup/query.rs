@@ -1,11 +1,12 @@
 //! The conversation with sensors that answer requests: RPLIDAR and YDLIDAR.
 //!
 //! ```text
-//! stop ─▶ drain ─▶ info ─▶ health (─▶ reset ─▶ stop) ─▶ introduced
+//! stop ─▶ drain ─▶ info ─▶ health (─▶ reset ─▶ stop) ─▶ zero angle, where the unit keeps one ─▶ introduced
 //! best mode ─▶ its answer type ─▶ its period ─▶ scan ─▶ streaming         (the modes: RPLIDAR since firmware 1.24)
 //! ```
 
-use super::{Action, Mode, StartConfig, StartError};
+use super::action::{Action, Mode};
+use super::config::{StartConfig, StartError};
 use crate::lidar::sensors::rplidar::command::{
     self as rplidar, Answer, Answers, CONF_ANSWER, CONF_PERIOD, CONF_TYPICAL, Health, Info,
 };
@@ -59,6 +60,7 @@ enum Step {
     Info,
     Health,
     Reset,
+    ZeroAngle,
     Introduced,
     TypicalMode,
     AnswerType,
@@ -75,6 +77,7 @@ impl Step {
             self,
             Self::Info
                 | Self::Health
+                | Self::ZeroAngle
                 | Self::TypicalMode
                 | Self::AnswerType
                 | Self::Period
@@ -96,13 +99,17 @@ pub(super) struct Query {
     was_reset: bool,
     scan_mode: Option<u16>,
     mode: Mode,
+    keeps_zero: bool,
+    zero: Option<i32>,
 }
 
 impl Query {
-    /// At the beginning.
-    pub(super) const fn new(commands: &'static Commands) -> Self {
+    /// At the beginning; a unit that keeps its zero angle is asked for it.
+    pub(super) const fn new(commands: &'static Commands, keeps_zero: bool) -> Self {
         Self {
             commands,
+            keeps_zero,
+            zero: None,
             step: Step::Stop,
             answers: Answers::new(),
             info: None,
@@ -120,6 +127,11 @@ impl Query {
     /// Who answered, if someone did.
     pub(super) fn info(&self) -> Option<Info> {
         self.info
+    }
+
+    /// The unit's own zero angle as it was told, a quarter of a degree a count.
+    pub(super) fn zero(&self) -> Option<i32> {
+        self.zero
     }
 
     /// How the sensor streams, once it does.
@@ -202,6 +214,7 @@ impl Query {
     fn give_up(&mut self) -> Action {
         let next = match self.step {
             Step::Info | Step::Health if self.commands.may_be_deaf => Step::Introduced,
+            Step::ZeroAngle => Step::Introduced,
             Step::Scan if self.commands.may_be_deaf && self.info.is_none() => Step::Streaming,
             Step::TypicalMode | Step::AnswerType | Step::Period => {
                 self.scan_mode = None;
@@ -225,6 +238,7 @@ impl Query {
             Step::Info => self.commands.info,
             Step::Health if self.tries & 1 == 1 => health_too,
             Step::Health => health,
+            Step::ZeroAngle => ydlidar::GET_ZERO_ANGLE,
             Step::Scan if self.scan_mode.is_some() => rplidar::EXPRESS_SCAN,
             Step::Scan => self.commands.scan,
             _ => rplidar::GET_CONF,
@@ -261,7 +275,11 @@ impl Query {
             }
             Step::Health => match Health::from_answer(answer) {
                 None => {}
-                Some(health) if health.status < 2 => self.go(Step::Introduced),
+                Some(health) if health.status < 2 => self.go(if self.keeps_zero {
+                    Step::ZeroAngle
+                } else {
+                    Step::Introduced
+                }),
                 Some(health) if self.was_reset => {
                     self.go(Step::Failed(StartError::Unhealthy(health)));
                 }
@@ -270,6 +288,12 @@ impl Query {
                     self.go(Step::Reset);
                 }
             },
+            Step::ZeroAngle => {
+                if let (0x04, &[z0, z1, z2, z3]) = (answer.kind, answer.payload()) {
+                    self.zero = Some(i32::from_le_bytes([z0, z1, z2, z3]));
+                    self.go(Step::Introduced);
+                }
+            }
             Step::TypicalMode | Step::AnswerType | Step::Period => {
                 if let Some((entry, value)) = rplidar::conf(answer) {
                     self.take_conf(entry, value);

@@ -14,8 +14,8 @@ impl Model {
         beams_per_revolution: 520,
         zero_cdeg: 0,
         counter_clockwise: false,
-        nearest_mm: 20,
-        farthest_mm: 12_000,
+        min_range_mm: 20,
+        max_range_mm: 12_000,
         motor: Motor::OwnOrPwm,
         start: Start::Listen,
         proof: Proof::RealBytes,
@@ -39,8 +39,8 @@ impl Model {
         baud: 921_600,
         points_per_s: 21_600,
         beams_per_revolution: 2300,
-        nearest_mm: 30,
-        farthest_mm: 25_000,
+        min_range_mm: 30,
+        max_range_mm: 25_000,
         motor: Motor::Own,
         proof: Proof::MakersParser,
         ..Self::LDROBOT_LD06
@@ -53,8 +53,8 @@ impl Model {
         points_per_s: 2300,
         revolutions_per_10s: 60,
         beams_per_revolution: 430,
-        nearest_mm: 150,
-        farthest_mm: 8000,
+        min_range_mm: 150,
+        max_range_mm: 8000,
         motor: Motor::Own,
         proof: Proof::MakersParser,
         ..Self::LDROBOT_LD06
@@ -65,10 +65,17 @@ impl Model {
         baud: 230_400,
         points_per_s: 4000,
         beams_per_revolution: 730,
-        nearest_mm: 100,
+        min_range_mm: 100,
         motor: Motor::Commands,
         start: Start::Send(&START),
         ..Self::LDROBOT_LD14
+    };
+    /// LDROBOT LD14P in its variant with 2300 measurements a second; on the line it looks as an LD14.
+    pub const LDROBOT_LD14P_2300: Self = Self {
+        name: "ld14p-2300",
+        points_per_s: 2300,
+        beams_per_revolution: 430,
+        ..Self::LDROBOT_LD14P
     };
     /// LDS-02 (HLS-LFCD3, LD08).
     pub const LDROBOT_LDS02: Self = Self {
@@ -76,8 +83,17 @@ impl Model {
         family: Family::Ldrobot(Parallax::Lds02),
         revolutions_per_10s: 50,
         beams_per_revolution: 510,
-        nearest_mm: 160,
+        min_range_mm: 160,
         proof: Proof::OneSource,
         ..Self::LDROBOT_LD14
+    };
+    /// Oradar MS200: the LD06's frames. Before them it tells its serial number and version in messages that begin with
+    /// `AA 55` and end with `31 F2`: they are skipped.
+    pub const ORADAR_MS200: Self = Self {
+        name: "ms200",
+        min_range_mm: 30,
+        motor: Motor::Own,
+        proof: Proof::Document,
+        ..Self::LDROBOT_LD06
     };
 }

@@ -54,6 +54,7 @@ impl Parser {
 
 /// State of the capsules' parser: the capsule that waits for the next, and its time (µs).
 #[derive(Debug, Clone)]
+#[doc(hidden)]
 pub struct Format {
     base: View,
     packing: Packing,

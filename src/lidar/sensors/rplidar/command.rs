@@ -42,7 +42,7 @@ pub const CONF_TYPICAL: u32 = 0x7c;
 pub(crate) const MOTOR_PWM_USUAL: u16 = 660;
 
 /// Longest payload of an answer that is kept.
-pub const LONGEST_ANSWER: usize = 32;
+pub const MAX_ANSWER: usize = 32;
 
 /// Encodes a request; `None` for a payload that leaves no room for command, length and check code.
 #[must_use]
@@ -66,7 +66,7 @@ pub struct Answer {
     pub kind: u8,
     /// A stream of such answers follows; the payload is empty.
     pub streams: bool,
-    payload: Vec<u8, LONGEST_ANSWER>,
+    payload: Vec<u8, MAX_ANSWER>,
 }
 
 impl Answer {
@@ -80,7 +80,7 @@ impl Answer {
 /// Finds answers among other bytes. About 60 bytes.
 #[derive(Debug, Clone, Default)]
 pub struct Answers {
-    bytes: Vec<u8, { 7 + LONGEST_ANSWER }>,
+    bytes: Vec<u8, { 7 + MAX_ANSWER }>,
 }
 
 impl Answers {
@@ -107,7 +107,7 @@ impl Answers {
                     let length = u32::from_le_bytes([l0, l1, l2, l3 & 0x3f]) as usize;
                     let streams = l3 >> 6 == 1;
                     let wanted = if streams { 0 } else { length };
-                    if wanted <= LONGEST_ANSWER {
+                    if wanted <= MAX_ANSWER {
                         if payload.len() < wanted {
                             return None;
                         }

@@ -29,6 +29,7 @@ pub type Parser = parser::Parser<Plain<Frames>, FRAME>;
 
 /// HQ packets.
 #[derive(Debug, Clone)]
+#[doc(hidden)]
 pub struct Frames;
 
 impl Layout for Frames {

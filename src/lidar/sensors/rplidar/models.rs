@@ -13,8 +13,8 @@ impl Model {
         beams_per_revolution: 400,
         zero_cdeg: 0,
         counter_clockwise: false,
-        nearest_mm: 150,
-        farthest_mm: 12_000,
+        min_range_mm: 150,
+        max_range_mm: 12_000,
         motor: Motor::Pwm,
         start: Start::Rplidar,
         proof: Proof::RealBytes,
@@ -35,8 +35,8 @@ impl Model {
         points_per_s: 32_000,
         revolutions_per_10s: 100,
         beams_per_revolution: 3400,
-        nearest_mm: 50,
-        farthest_mm: 30_000,
+        min_range_mm: 50,
+        max_range_mm: 30_000,
         motor: Motor::Commands,
         proof: Proof::MakersParser,
         ..Self::RPLIDAR_SCAN
@@ -47,8 +47,15 @@ impl Model {
         baud: 460_800,
         points_per_s: 5000,
         beams_per_revolution: 540,
-        farthest_mm: 12_000,
+        max_range_mm: 12_000,
         ..Self::RPLIDAR_DENSE
+    };
+    /// RPLIDAR C1 in standard scan.
+    pub const RPLIDAR_C1_SCAN: Self = Self {
+        name: "rplidar-c1-scan",
+        family: Family::RplidarScan,
+        proof: Proof::OneSource,
+        ..Self::RPLIDAR_C1
     };
     /// RPLIDAR A3 in boost scan.
     pub const RPLIDAR_ULTRA: Self = Self {
@@ -58,7 +65,7 @@ impl Model {
         points_per_s: 16_000,
         revolutions_per_10s: 100,
         beams_per_revolution: 1700,
-        farthest_mm: 25_000,
+        max_range_mm: 25_000,
         motor: Motor::Commands,
         proof: Proof::MakersParser,
         ..Self::RPLIDAR_SCAN
@@ -67,7 +74,7 @@ impl Model {
     pub const RPLIDAR_ULTRADENSE: Self = Self {
         name: "rplidar-ultradense",
         family: Family::RplidarUltraDense,
-        farthest_mm: 40_000,
+        max_range_mm: 40_000,
         ..Self::RPLIDAR_DENSE
     };
     /// RPLIDAR in HQ scan; 8 bytes a point, so only on a fast line.

@@ -49,6 +49,7 @@ impl UltraDenseParser {
 
 /// State of the parser: the capsule that waits for the next, and its time (µs).
 #[derive(Debug, Clone)]
+#[doc(hidden)]
 pub struct Format<const L: usize> {
     base: View,
     /// Last distance of the capsule before (mm/4): ultra-dense capsules smooth over their border.

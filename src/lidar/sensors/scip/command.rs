@@ -5,7 +5,7 @@
 
 use heapless::Vec;
 
-use super::check_character;
+use super::text::{MAX_LINE, check_character};
 use crate::lidar::model::Steps;
 use crate::lidar::wire::request::Request;
 
@@ -23,9 +23,6 @@ pub const LASER_ON: &[u8] = b"BM\n";
 pub const STOP: &[u8] = b"QT\n";
 /// Restarts the sensor.
 pub const RESET: &[u8] = b"RS\n";
-
-/// Longest line of a reply that is kept.
-pub const LONGEST_LINE: usize = 80;
 
 /// Sets the speed of the line (bits/s, six digits).
 #[must_use]
@@ -97,7 +94,7 @@ enum State {
 /// Finds replies among other bytes. About 100 bytes.
 #[derive(Debug, Clone)]
 pub struct Replies {
-    line: Vec<u8, LONGEST_LINE>,
+    line: Vec<u8, MAX_LINE>,
     state: State,
     /// The line is complete and goes with the next byte.
     whole: bool,
@@ -187,7 +184,7 @@ impl Replies {
 }
 
 /// Name and value of a line `NAME:value;` with the right check character.
-fn field(line: &[u8]) -> Option<(&[u8], &[u8])> {
+pub(super) fn field(line: &[u8]) -> Option<(&[u8], &[u8])> {
     let (code, text) = line.split_last()?;
     let field = text.strip_suffix(b";")?;
     let colon = field.iter().position(|c| *c == b':')?;
@@ -206,9 +203,9 @@ impl Default for Replies {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Parameters {
     /// Nearest range (mm).
-    pub nearest_mm: u16,
+    pub min_range_mm: u16,
     /// Farthest range (mm).
-    pub farthest_mm: u16,
+    pub max_range_mm: u16,
     /// Steps of a revolution.
     pub per_revolution: u16,
     /// First step that is measured.
@@ -224,8 +221,8 @@ pub struct Parameters {
 impl Parameters {
     /// Before anything was told.
     pub(crate) const NONE: Self = Self {
-        nearest_mm: 0,
-        farthest_mm: 0,
+        min_range_mm: 0,
+        max_range_mm: 0,
         per_revolution: 0,
         first: 0,
         last: 0,
@@ -236,8 +233,8 @@ impl Parameters {
     /// Takes a field of a reply to [`PARAMETERS`]; other names and values that are no numbers change nothing.
     pub fn take(&mut self, name: &[u8], value: &[u8]) {
         let slot = match name {
-            b"DMIN" => &mut self.nearest_mm,
-            b"DMAX" => &mut self.farthest_mm,
+            b"DMIN" => &mut self.min_range_mm,
+            b"DMAX" => &mut self.max_range_mm,
             b"ARES" => &mut self.per_revolution,
             b"AMIN" => &mut self.first,
             b"AMAX" => &mut self.last,
@@ -262,6 +259,8 @@ impl Parameters {
         holds.then_some(Steps {
             per_revolution: self.per_revolution,
             front: self.front,
+            last: self.last,
+            rpm: self.rpm,
         })
     }
 }
@@ -298,8 +297,8 @@ mod tests {
     #[test]
     fn the_specifications_example() {
         let expected = Parameters {
-            nearest_mm: 20,
-            farthest_mm: 5600,
+            min_range_mm: 20,
+            max_range_mm: 5600,
             per_revolution: 1024,
             first: 44,
             last: 725,
@@ -307,7 +306,11 @@ mod tests {
             rpm: 600,
         };
         assert_eq!(parameters(REPLY), (expected, 1, 0));
-        assert_eq!(expected.steps(), Some(Steps::URG04LX));
+        let steps = Steps {
+            last: 725,
+            ..Steps::URG04LX
+        };
+        assert_eq!(expected.steps(), Some(steps));
         // After the rest of a scan, and with other line ends.
         let mut after = Vec::<u8, 300>::from_slice(b"1Dh1DhP\n\n").expect("room");
         for &byte in REPLY {

@@ -33,6 +33,7 @@ pub type Parser = parser::Parser<Plain<Frames>, FRAME>;
 
 /// Frames of a whole revolution each.
 #[derive(Debug, Clone)]
+#[doc(hidden)]
 pub struct Frames;
 
 impl Layout for Frames {

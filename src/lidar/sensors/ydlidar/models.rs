@@ -1,5 +1,6 @@
 //! The YDLIDAR sensors.
 
+use super::command;
 use crate::lidar::model::{Family, Model, Motor, Proof, Samples, Start};
 
 impl Model {
@@ -13,10 +14,10 @@ impl Model {
         beams_per_revolution: 700,
         zero_cdeg: 0,
         counter_clockwise: false,
-        nearest_mm: 100,
-        farthest_mm: 8000,
+        min_range_mm: 100,
+        max_range_mm: 8000,
         motor: Motor::Pwm,
-        start: Start::Ydlidar,
+        start: Start::Ydlidar { keeps_zero: false },
         proof: Proof::RealBytes,
     };
     /// YDLIDAR X4.
@@ -25,8 +26,8 @@ impl Model {
         baud: 128_000,
         points_per_s: 5000,
         beams_per_revolution: 900,
-        nearest_mm: 120,
-        farthest_mm: 10_000,
+        min_range_mm: 120,
+        max_range_mm: 10_000,
         ..Self::YDLIDAR_X2
     };
     /// YDLIDAR G2 and others with an intensity byte.
@@ -34,10 +35,22 @@ impl Model {
         name: "ydlidar-g2",
         family: Family::Ydlidar(Samples::TRIANGLE_INTENSITY),
         baud: 230_400,
-        nearest_mm: 280,
-        farthest_mm: 16_000,
+        min_range_mm: 280,
+        max_range_mm: 16_000,
         motor: Motor::Commands,
+        start: Start::Ydlidar { keeps_zero: true },
         proof: Proof::MakersParser,
+        ..Self::YDLIDAR_X4
+    };
+    /// YDLIDAR S4B: 8 bits of intensity.
+    pub const YDLIDAR_S4B: Self = Self {
+        name: "ydlidar-s4b",
+        family: Family::Ydlidar(Samples::TRIANGLE_DOUBT),
+        baud: 153_600,
+        points_per_s: 4000,
+        beams_per_revolution: 750,
+        max_range_mm: 8000,
+        proof: Proof::OneSource,
         ..Self::YDLIDAR_X4
     };
     /// YDLIDAR G4.
@@ -46,9 +59,18 @@ impl Model {
         family: Family::Ydlidar(Samples::TRIANGLE),
         points_per_s: 9000,
         beams_per_revolution: 1500,
-        nearest_mm: 100,
+        min_range_mm: 100,
+        start: Start::Ydlidar { keeps_zero: false },
         proof: Proof::RealBytes,
         ..Self::YDLIDAR_G2
+    };
+    /// YDLIDAR G4B: 10 bits of intensity.
+    pub const YDLIDAR_G4B: Self = Self {
+        name: "ydlidar-g4b",
+        family: Family::Ydlidar(Samples::TRIANGLE_INTENSITY),
+        baud: 512_000,
+        proof: Proof::OneSource,
+        ..Self::YDLIDAR_G4
     };
     /// YDLIDAR G6, G7.
     pub const YDLIDAR_G6: Self = Self {
@@ -57,7 +79,7 @@ impl Model {
         baud: 512_000,
         points_per_s: 18_000,
         beams_per_revolution: 3000,
-        farthest_mm: 25_000,
+        max_range_mm: 25_000,
         proof: Proof::MakersParser,
         ..Self::YDLIDAR_G4
     };
@@ -68,8 +90,9 @@ impl Model {
         points_per_s: 4000,
         revolutions_per_10s: 60,
         beams_per_revolution: 750,
-        nearest_mm: 50,
-        farthest_mm: 12_000,
+        min_range_mm: 50,
+        max_range_mm: 12_000,
+        start: Start::Ydlidar { keeps_zero: false },
         proof: Proof::RealBytes,
         ..Self::YDLIDAR_G2
     };
@@ -88,9 +111,25 @@ impl Model {
         points_per_s: 20_000,
         revolutions_per_10s: 100,
         beams_per_revolution: 2300,
-        nearest_mm: 50,
-        farthest_mm: 50_000,
+        min_range_mm: 50,
+        max_range_mm: 50_000,
         proof: Proof::MakersParser,
         ..Self::YDLIDAR_G2
+    };
+    /// COIN-D4, also sold as TurtleBot3's LDS-03: by its frames alone it looks like a T-mini.
+    pub const COIN_D4: Self = Self {
+        name: "coin-d4",
+        family: Family::Ydlidar(Samples::COIN_D4),
+        baud: 230_400,
+        points_per_s: 4000,
+        revolutions_per_10s: 60,
+        beams_per_revolution: 750,
+        zero_cdeg: 0,
+        counter_clockwise: false,
+        min_range_mm: 50,
+        max_range_mm: 8000,
+        motor: Motor::Commands,
+        start: Start::Send(&command::COIN_D4_START),
+        proof: Proof::RealBytes,
     };
 }
