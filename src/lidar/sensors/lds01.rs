@@ -102,7 +102,7 @@ fn check_code(body: &[u8]) -> u8 {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet {
-    /// Which half dozen of degrees, 0…59.
+    /// Which six degrees, 0…59.
     pub index: u8,
     /// Speed of the motor (0.1 rpm).
     pub speed_drpm: u16,

@@ -112,7 +112,7 @@ fn point(bytes: &[u8]) -> (Result<u32, NoReturn>, u16) {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet {
-    /// Which quarter dozen of degrees, 0…89.
+    /// Which four degrees, 0…89.
     pub index: u8,
     /// Speed of the motor (rpm/64).
     pub speed_rpm_q6: u16,

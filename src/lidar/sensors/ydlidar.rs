@@ -147,7 +147,7 @@ fn check_code(frame: &[u8], sample_bytes: u8) -> u16 {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet {
-    /// Speed (0.1 revolutions/s), where a turn starts; 0 on sensors that do not tell.
+    /// Speed (0.1 revolutions/s), in the frame that starts a revolution; 0 on sensors that do not tell.
     pub speed_dhz: Option<u8>,
     view: View,
     format: Samples,

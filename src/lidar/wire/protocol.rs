@@ -36,7 +36,7 @@ pub trait Protocol {
     fn survey(&self, bytes: &[u8]) -> Survey;
 }
 
-/// What a parser has seen since its start; every number wraps.
+/// Counts of what a parser has seen since its start; every number wraps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters {

@@ -129,7 +129,7 @@ impl Answers {
     }
 }
 
-/// Takes the first element off.
+/// Removing the first element.
 trait RemoveFirst {
     fn remove_first(&mut self);
 }
@@ -144,7 +144,7 @@ impl<const N: usize> RemoveFirst for Vec<u8, N> {
     }
 }
 
-/// Who the sensor is.
+/// Identity of a sensor, as it reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Info {
@@ -172,7 +172,7 @@ impl Info {
     }
 }
 
-/// How the sensor feels.
+/// Health of a sensor, as it reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Health {
