@@ -14,6 +14,7 @@ pub mod order;
 pub mod pairs;
 pub mod ros;
 pub mod ros_map;
+pub mod trajectory;
 mod unknown;
 
 use std::path::Path;
@@ -38,6 +39,8 @@ pub struct Options {
     pub scan_topic: Option<String>,
     /// The odometry topic of a ROS bag.
     pub odom_topic: Option<String>,
+    /// How the lidar sits on the robot, whatever the log says.
+    pub mount: Option<Mount>,
 }
 
 /// One scan of a log.
@@ -87,6 +90,28 @@ pub struct Capture {
 }
 
 impl Log {
+    /// Thins scans of more beams than `most`; gives the number of beams that this costs.
+    ///
+    /// Bytes that the scans were decoded from are given up then: they hold all beams.
+    pub fn thin(&mut self, most: usize) -> usize {
+        let beams = |log: &Self| -> usize { log.scans.iter().map(|scan| scan.beams.len()).sum() };
+        let before = beams(self);
+        for scan in &mut self.scans {
+            if scan.beams.len() > most {
+                scan.beams = thinned(std::mem::take(&mut scan.beams), most);
+                self.capture = None;
+            }
+        }
+        before - beams(self)
+    }
+
+    /// Most beams of a scan that have a range.
+    #[must_use]
+    pub fn most_ranges(&self) -> usize {
+        let ranges = |scan: &Recorded| scan.beams.iter().filter(|b| b.range.is_some()).count();
+        self.scans.iter().map(ranges).max().unwrap_or(0)
+    }
+
     /// Counts something left out; the first one is remembered by `place` and `why`.
     pub(crate) fn skip(&mut self, place: impl std::fmt::Display, why: impl std::fmt::Display) {
         self.skipped += 1;

@@ -101,6 +101,13 @@ impl<W: Write> Watch<W> {
                 self.take(message)?;
             }
         }
+        // Whoever ends it by a signal keeps what came so far.
+        if let Some(qualities) = &mut self.qualities {
+            qualities.flush()?;
+        }
+        if let Some(recorder) = &mut self.recorder {
+            recorder.flush()?;
+        }
         Ok(())
     }
 

@@ -37,13 +37,16 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(capture) = telemetry::capture(&content.bytes) {
         content.bytes = capture;
     }
+    output::spare(&[&args.file], &[args.csv.as_deref()])?;
+    let model = decode::model(&args.lidar, &content.bytes)?;
     let mut csv = args.csv.as_deref().map(output::create).transpose()?;
     let mut written = Ok(());
     if let Some(csv) = &mut csv {
         written = writeln!(csv, "scan,time_us,angle_deg,range_mm,quality");
     }
-    let model = decode::model(&args.lidar, &content.bytes)?;
+    let mut ranges = 0u32;
     let summary = decode::decode(model.name, &content.bytes, &mut |row| {
+        ranges += u32::from(row.range_mm.is_some());
         if let (Some(csv), Ok(())) = (&mut csv, &written) {
             let range = row.range_mm.map_or(String::new(), |mm| mm.to_string());
             written = writeln!(
@@ -85,7 +88,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let alternatives = decode::alternatives(&args.lidar, &content.bytes);
     let value = json!({
         "lidar": model.name, "alternatives": alternatives, "baud": model.baud, "hints": hints, "bytes": bytes.len(), "packets": packets, "check_errors": check_errors,
-        "skipped_bytes": skipped_bytes, "tail_bytes": tail_bytes, "scans": scans, "points": points,
+        "skipped_bytes": skipped_bytes, "tail_bytes": tail_bytes, "scans": scans, "points": points, "ranges": ranges,
     });
     let mut text = format!(
         "{}: {packets} packets, {points} points, {scans} revolutions; {check_errors} frames failed their check, \
@@ -102,7 +105,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         text += &format!("\nhint: {hint}");
     }
     output::report(args.json, &value, &text)?;
-    match content.cut {
+    if points > 0 && ranges == 0 {
+        eprintln!(
+            "beamfix: {name}: none of {points} measurements has a range: a covered lidar, or one that spins up"
+        );
+    }
+    let content_cut = content.cut.or_else(|| capture::cut(&content.bytes));
+    match content_cut {
         Some(cut) => Err(anyhow::anyhow!("{name}: {cut}")),
         None => Ok(ExitCode::SUCCESS),
     }

@@ -46,7 +46,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         "--out {}: the table's own file, neither a map nor what is written beside it, e.g. flat.field",
         args.out.display()
     );
-    let map = ros_map::read(&args.map)?;
+    let mut remarks = Vec::new();
+    let map = ros_map::read_remarking(&args.map, &mut remarks)?;
+    output::remark(&remarks);
     let shape = *map.shape();
     let bytes = stored::HEADER + shape.len();
     let ram = Pyramid::bytes(&shape);

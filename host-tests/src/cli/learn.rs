@@ -64,7 +64,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         args.log.display()
     );
     let map = match &args.map {
-        Some(path) => ros_map::read(path)?,
+        Some(path) => {
+            let mut remarks = Vec::new();
+            let map = ros_map::read_remarking(path, &mut remarks)?;
+            output::remark(&remarks);
+            map
+        }
         None => learn::map_from_log(&log, args.resolution, range_max)?,
     };
     if let Some(path) = &args.keep_map {

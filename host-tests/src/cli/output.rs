@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
 
@@ -37,4 +37,41 @@ pub fn create(path: &Path) -> Result<BufWriter<File>> {
     File::create(path)
         .map(BufWriter::new)
         .with_context(|| path.display().to_string())
+}
+
+/// Prints remarks about what was read, a line each, on stderr.
+pub fn remark(remarks: &[String]) {
+    for line in remarks {
+        eprintln!("beamfix: {line}");
+    }
+}
+
+/// Refuses to write over a file that is read.
+pub fn spare(read: &[&Path], written: &[Option<&Path>]) -> Result<()> {
+    for output in written.iter().flatten() {
+        for input in read {
+            ensure!(
+                !is_same(input, output),
+                "{}: it is read, and would be overwritten",
+                output.display()
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Whether two names are one file, by whatever links.
+fn is_same(one: &Path, other: &Path) -> bool {
+    let (Ok(one), Ok(other)) = (one.metadata(), other.metadata()) else {
+        return false;
+    };
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        one.is_file() && (one.dev(), one.ino()) == (other.dev(), other.ino())
+    }
+    #[cfg(not(unix))]
+    {
+        one.is_file() && one.modified().ok() == other.modified().ok() && one.len() == other.len()
+    }
 }

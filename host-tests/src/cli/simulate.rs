@@ -16,6 +16,7 @@ use host_tests::decode::{self, Summary};
 use host_tests::formats::bytes::Content;
 use host_tests::formats::capture::log::{self, Revolution};
 use host_tests::formats::capture::simulated;
+use host_tests::formats::ros::bag::ATTACHMENT;
 use host_tests::formats::{Log, ros_map};
 use host_tests::pipeline::{config, follow};
 use host_tests::report::mcap::McapFile;
@@ -128,6 +129,8 @@ fn replay<const N: usize>(
         |revolution| simulated::moment(&drive, revolution).context("a revolution ends at a beam");
     let origin = moment(revolutions.first().context("there is a revolution")?)?;
     let mut mcap = McapFile::create(&args.out.join("run.mcap"), &["estimate", "truth", "wheels"])?;
+    // So that `replay` takes this file too.
+    mcap.attach(ATTACHMENT, &fs::read(args.out.join("lidar.rec"))?)?;
     let mut trajectory = output::create(&args.out.join("trajectory.txt"))?;
     let mut truth = output::create(&args.out.join("truth.txt"))?;
     let mut track = Track::new(origin.truth, settings.mount.into(), DRAWN);

@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Read, Write};
-use std::net::TcpStream;
+use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::thread;
@@ -46,6 +46,9 @@ pub struct Args {
     /// Ask the board how good each match was and write it here: a line of CSV for each.
     #[arg(long, value_name = "FILE")]
     quality: Option<PathBuf>,
+    /// Give up where nothing comes over TCP for so long.
+    #[arg(long, value_name = "S", default_value_t = 10.0)]
+    timeout: f64,
     /// Stop after so many poses.
     #[arg(long, value_name = "N")]
     poses: Option<u32>,
@@ -66,12 +69,23 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bail!("--seconds {}: not a time", args.seconds);
     }
     Kind::of(&args.out).context("--out")?;
+    if !(args.timeout.is_finite() && args.timeout > 0.0) {
+        bail!("--timeout {}: not a time", args.timeout);
+    }
+    let source = args.source.as_deref().map(Path::new);
+    let written = [
+        args.record.as_deref(),
+        args.quality.as_deref(),
+        Some(&args.out),
+    ];
+    output::spare(source.as_slice(), &written)?;
     let recording = args.record.as_deref().map(output::create).transpose()?;
     let qualities = args.quality.as_deref().map(output::create).transpose()?;
     let mut live = Live {
         args,
         watch: Watch::new(recording, qualities)?,
         drawn: Instant::now(),
+        silent: false,
     };
     if let Some(folder) = args.out.parent() {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
@@ -81,8 +95,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         (None, Some("-")) => live.follow(io::stdin().lock(), "-")?,
         (None, Some(source)) => match source.strip_prefix("tcp:") {
             Some(address) => {
-                let stream = TcpStream::connect(address)
+                let patience = Duration::from_secs_f64(args.timeout);
+                let stream = connected(address, patience)
                     .with_context(|| format!("{source}: no connection"))?;
+                stream.set_read_timeout(Some(patience))?;
                 let mut commands = stream.try_clone()?;
                 live.ask(&mut commands);
                 live.follow(stream, source)?;
@@ -107,6 +123,8 @@ struct Live<'a> {
     args: &'a Args,
     watch: Watch<BufWriter<File>>,
     drawn: Instant,
+    /// Nothing came for as long as one waits.
+    silent: bool,
 }
 
 impl Live<'_> {
@@ -117,6 +135,12 @@ impl Live<'_> {
             let n = match source.read(&mut bytes) {
                 Ok(n) => n,
                 Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                Err(error)
+                    if [ErrorKind::WouldBlock, ErrorKind::TimedOut].contains(&error.kind()) =>
+                {
+                    self.silent = true;
+                    return Ok(());
+                }
                 Err(error) => return Err(error).with_context(|| name.to_owned()),
             };
             self.watch.push(&bytes[..n])?;
@@ -242,8 +266,13 @@ impl Live<'_> {
         self.watch.finish()?;
         if self.watch.poses == 0 {
             let counters = self.watch.counters();
+            let silence = if self.silent {
+                format!("; nothing came for {} s", self.args.timeout)
+            } else {
+                String::new()
+            };
             bail!(
-                "no pose: {} frames understood, {} damaged",
+                "no pose: {} frames understood, {} damaged{silence}",
                 counters.frames,
                 counters.errors
             );
@@ -259,8 +288,26 @@ impl Live<'_> {
         });
         let text = format!("{}\n{}", watch.status(), self.args.out.display());
         output::report(self.args.json, &value, &text)?;
+        if self.silent {
+            bail!(
+                "the board fell silent: nothing came for {} s",
+                self.args.timeout
+            );
+        }
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// A connection to the first address that answers in time.
+fn connected(address: &str, patience: Duration) -> io::Result<TcpStream> {
+    let mut last = io::Error::from(ErrorKind::NotFound);
+    for address in address.to_socket_addrs()? {
+        match TcpStream::connect_timeout(&address, patience) {
+            Ok(stream) => return Ok(stream),
+            Err(error) => last = error,
+        }
+    }
+    Err(last)
 }
 
 fn replace(new: &Path, old: &Path) -> Result<()> {

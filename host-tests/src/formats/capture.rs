@@ -84,6 +84,11 @@ impl<W: Write> Recorder<W> {
         self.output.write_all(&payload)
     }
 
+    /// Hands on what was pushed so far.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.output.flush()
+    }
+
     /// Ends the capture.
     pub fn finish(mut self) -> io::Result<W> {
         self.output.flush()?;
@@ -122,6 +127,30 @@ pub fn pieces(file: &[u8]) -> Vec<Piece<'_>> {
         }));
     }
     pieces
+}
+
+/// Why a capture with times ends before it should: it breaks off inside a piece.
+#[must_use]
+pub fn cut(file: &[u8]) -> Option<String> {
+    let mut rest = file.strip_prefix(MAGIC)?;
+    let mut whole = 0usize;
+    while !rest.is_empty() {
+        let piece = match *rest {
+            [_, _, _, _, _, _, _, _, _, l0, l1, l2, l3, ref payload @ ..] => {
+                payload.get(u32::from_le_bytes([l0, l1, l2, l3]) as usize..)
+            }
+            _ => None,
+        };
+        let Some(after) = piece else {
+            return Some(format!(
+                "the capture breaks off inside a piece, after {whole} whole ones in {} bytes",
+                file.len()
+            ));
+        };
+        rest = after;
+        whole += 1;
+    }
+    None
 }
 
 fn pose(payload: &[u8]) -> Option<Pose> {
@@ -203,5 +232,9 @@ mod tests {
             );
         }
         assert_eq!(plain(&[7, 8])[..], [7, 8]);
+        assert!(cut(&file).is_none() && cut(&[7, 8]).is_none());
+        for end in [MAGIC.len() + 1, MAGIC.len() + 12, file.len() - 1] {
+            assert!(cut(&file[..end]).is_some(), "{end}");
+        }
     }
 }

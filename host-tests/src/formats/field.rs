@@ -1,16 +1,18 @@
 //! The likelihood field of a map on disk: a table that `field` wrote, or one made from a ROS map.
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow};
 use beamfix::grid::occupancy;
 use beamfix::sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile, stored};
 
+use super::bytes;
 use super::ros_map::{self, Map};
 
 /// How a table starts.
 const MAGIC: &[u8] = b"BFLF";
+/// Larger files are neither (bytes).
+const MAX_FILE: u64 = 1 << 29;
 
 /// A field in memory.
 pub enum FieldFile {
@@ -22,16 +24,16 @@ pub enum FieldFile {
 
 impl FieldFile {
     /// Reads `path`: a table where it starts as one, a ROS map's YAML file otherwise, from which a field is made with
-    /// [`FieldModel::DEFAULT`].
-    pub fn read(path: &Path) -> Result<Self> {
+    /// [`FieldModel::DEFAULT`]. `remarks` gets a line about each odd thing.
+    pub fn read(path: &Path, remarks: &mut Vec<String>) -> Result<Self> {
         let name = || path.display().to_string();
-        let bytes = fs::read(path).with_context(name)?;
+        let bytes = bytes::load_at_most(path, MAX_FILE)?.bytes;
         if bytes.starts_with(MAGIC) || path.extension().is_some_and(|ending| ending == "field") {
             let file = Self::Table(bytes);
             file.field().with_context(name)?;
             return Ok(file);
         }
-        let map = ros_map::read(path)?;
+        let map = ros_map::read_remarking(path, remarks)?;
         Ok(Self::Made(of_map(&map, &FieldModel::DEFAULT)?))
     }
 

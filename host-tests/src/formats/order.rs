@@ -1,8 +1,8 @@
 //! In which order, and how fast, the beams of a scan were measured.
 //!
 //! A `LaserScan` says "from one element to the next". Drivers of clockwise lidars turn the array round, so that angles
-//! grow, and leave `time_increment` positive: then the last element was measured first. Others leave it 0. Which of it
-//! a recording holds shows where the robot turns: bent back the wrong way, scans do not fit each other.
+//! grow, and leave `time_increment` positive: then the last element was measured first. Which of
+//! it a recording holds shows where the robot turns: bent back the wrong way, scans do not fit each other.
 
 use beamfix::geometry::Pose;
 use beamfix::odometry::OdometryConfig;
@@ -47,40 +47,72 @@ pub struct Timing {
 const MAX_STEP: f64 = 0.01;
 
 impl Timing {
-    /// What a scan of `count` elements may mean that states `time_step` and `scan_time` (s), the stated meaning first.
+    /// What a scan may mean that states `time_step` (s), the stated meaning first: no step is believed as it stands.
     #[must_use]
-    pub fn candidates(time_step: f64, scan_time: f64, count: usize) -> Vec<Self> {
-        let stated = libm::fabs(time_step);
-        let is_stated = stated > 0.0 && stated < MAX_STEP;
-        let shared = scan_time / count.max(1) as f64;
+    pub fn candidates(time_step: f64) -> Vec<Self> {
+        let step = libm::fabs(time_step);
         let timing = |order, step| Self {
             order,
             step,
             ends_at_stamp: false,
         };
-        let at_once = timing(Order::AtOnce, 0.0);
-        let both = |step| [timing(Order::InOrder, step), timing(Order::Reversed, step)];
-        if is_stated && time_step < 0.0 {
+        let is_stated = step > 0.0 && step < MAX_STEP;
+        if !is_stated {
+            vec![timing(Order::AtOnce, 0.0)]
+        } else if time_step < 0.0 {
             // By the definition the first element is the last in time, and has the stamp.
             let backwards = Self {
                 ends_at_stamp: true,
-                ..timing(Order::Reversed, stated)
+                ..timing(Order::Reversed, step)
             };
-            [&[backwards], &both(stated)[..], &[at_once]].concat()
-        } else if is_stated {
-            [&both(stated)[..], &[at_once]].concat()
-        } else if shared > 0.0 && shared < MAX_STEP {
-            [&[at_once], &both(shared)[..]].concat()
+            vec![backwards, timing(Order::InOrder, step)]
         } else {
-            vec![at_once]
+            vec![timing(Order::InOrder, step), timing(Order::Reversed, step)]
+        }
+    }
+
+    /// The order that the user tells; the step is the stated one, or the scan's time in equal parts.
+    #[must_use]
+    pub fn told(order: Order, time_step: f64, scan_time: f64, count: usize) -> Self {
+        let stated = libm::fabs(time_step);
+        let shared = scan_time / count.max(1) as f64;
+        let step = [stated, shared]
+            .into_iter()
+            .find(|step| *step > 0.0 && *step < MAX_STEP);
+        Self {
+            order: if step.is_some() { order } else { Order::AtOnce },
+            step: step.unwrap_or(0.0),
+            ends_at_stamp: false,
+        }
+    }
+
+    /// Time of the last of `count` elements after the stamp (s).
+    #[must_use]
+    pub fn end(&self, count: usize) -> f64 {
+        if self.ends_at_stamp || self.order == Order::AtOnce {
+            0.0
+        } else {
+            self.step * count.saturating_sub(1) as f64
         }
     }
 
     /// Gives beams in the order of the array the times that they have: in the order of time, the first at `stamp_us` or
     /// the last there.
-    pub fn apply(&self, beams: &mut [Beam], stamp_us: u32) {
-        if self.order == Order::Reversed {
-            beams.reverse();
+    ///
+    /// Beams of one moment have no order in time: they run counter-clockwise about the robot from behind the lidar, so
+    /// that one that hangs head down gives the poses of an upright one.
+    pub fn apply(&self, beams: &mut [Beam], stamp_us: u32, upside_down: bool) {
+        match self.order {
+            Order::InOrder => {}
+            Order::Reversed => beams.reverse(),
+            Order::AtOnce => beams.sort_by_key(|beam| {
+                let bearing = beam.bearing.0 as i16;
+                if upside_down {
+                    bearing.wrapping_neg()
+                } else {
+                    bearing
+                }
+            }),
         }
         let step_us = if self.order == Order::AtOnce {
             0.0
@@ -104,9 +136,9 @@ const TURNING: f32 = 0.02;
 /// So many turning scans are enough, and so few tell nothing.
 const ENOUGH: usize = 150;
 const TOO_FEW: usize = 10;
-/// Another order than the stated one must raise the mean score of a match by this: the wrong one costs 0.1 to 0.3 of
-/// it, noise less than 0.01.
-const MARGIN: f64 = 0.02;
+/// The other order must raise the mean score of a match by this: the wrong one costs 0.02 of it in steady turns, whose
+/// scans are all bent alike, and 0.2 where the turn rate changes.
+const MARGIN: f64 = 0.01;
 
 /// The timing among `candidates` by which scans fit each other best where the robot turns; the first one if they say
 /// nothing. `scans` gives the scans by a timing, one by one.

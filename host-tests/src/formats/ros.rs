@@ -1,6 +1,7 @@
 //! ROS recordings: `sensor_msgs/LaserScan` and `nav_msgs/Odometry` of one topic each, and the static transforms.
 //!
-//! Read are MCAP files, SQLite bags, and rosbag2's folders, packed or not. Odometry is the last message before a scan.
+//! Read are MCAP files, SQLite bags, and rosbag2's folders, packed or not. Odometry is the last message up to a scan's
+//! last beam.
 
 pub mod bag;
 mod decoder;
@@ -14,7 +15,7 @@ use self::bag::{Bag, Topic};
 use self::message::{Kind, Laser, Odometry, Transform};
 use self::tree::Tree;
 use super::no_return::{Limits, Rule};
-use super::order::{self, Order, Timing};
+use super::order::{self, Timing};
 use super::{Log, Options, Recorded, clock::Clock};
 
 /// Reads the scans of one laser topic.
@@ -32,22 +33,19 @@ pub fn parse(bag: Bag, options: &Options) -> Result<Log> {
         return Ok(log);
     };
     let mut tree = Tree::default();
-    let mut wheels: Option<Odometry> = None;
-    let mut base = None;
-    let mut scans: Vec<(Laser, Option<Odometry>)> = Vec::new();
+    let mut wheels: Vec<Odometry> = Vec::new();
+    // Each scan, and how many wheel poses came before it.
+    let mut scans: Vec<(Laser, usize)> = Vec::new();
     for (number, message) in bag.messages.iter().enumerate() {
         let topic = &bag.topics[message.topic];
         let (data, layout) = (&message.data[..], topic.layout);
         let result = match topic.kind {
             Kind::Static => Transform::read_all(data, layout).map(|all| tree.take(all)),
             Kind::Odometry if odometries.taken == Some(message.topic) => {
-                Odometry::read(data, layout).map(|odometry| {
-                    base.get_or_insert_with(|| odometry.child.clone());
-                    wheels = Some(odometry);
-                })
+                Odometry::read(data, layout).map(|odometry| wheels.push(odometry))
             }
             Kind::Laser if taken == message.topic => {
-                Laser::read(data, layout).map(|laser| scans.push((laser, wheels.clone())))
+                Laser::read(data, layout).map(|laser| scans.push((laser, wheels.len())))
             }
             _ => Ok(()),
         };
@@ -73,7 +71,8 @@ pub fn parse(bag: Bag, options: &Options) -> Result<Log> {
     if Limits::is_impossible(first.nearest, first.farthest) {
         source += &format!(", range_max {} m is not believed", first.farthest);
     }
-    source += &mounted(&mut log, &tree, base.as_deref(), &first.header.frame);
+    let base = wheels.first().map(|odometry| &odometry.child[..]);
+    source += &mounted(&mut log, &tree, base, &first.header.frame);
     let limits = |k: usize| scans_of_limits[k];
     let readings = scans.iter().enumerate();
     let rule = Rule::of(readings.map(|(k, (laser, _))| (&laser.ranges[..], limits(k))));
@@ -82,26 +81,71 @@ pub fn parse(bag: Bag, options: &Options) -> Result<Log> {
         .iter()
         .map(|(laser, _)| clock.at(laser.header.seconds()))
         .collect();
+    let mount = options.mount.unwrap_or(log.mount);
     let beams = |k: usize, timing: &Timing| {
         let mut beams = beams(&scans[k].0, rule, limits(k));
-        timing.apply(&mut beams, times[k]);
+        timing.apply(&mut beams, times[k], mount.upside_down);
         beams
     };
     let (timing, how) = timing(first, options, |candidates| {
-        order::fitting(candidates, scans.len(), log.mount, beams)
+        order::fitting(candidates, scans.len(), mount, beams)
     });
     source += &how;
-    for (k, (laser, wheels)) in scans.iter().enumerate() {
+    let history = History::of(
+        &wheels,
+        scans.iter().map(|(laser, _)| laser.header.seconds()),
+    );
+    for (k, (laser, before)) in scans.iter().enumerate() {
         log.odd.count(&laser.ranges);
+        let end = laser.header.seconds() + timing.end(laser.ranges.len());
         log.scans.push(Recorded {
             stamp: format!("{}.{:09}", laser.header.sec, laser.header.nanosec),
-            wheels: wheels.as_ref().map(|odometry| odometry.pose.into()),
+            wheels: history
+                .at(end, *before)
+                .map(|odometry| odometry.pose.into()),
             beams: beams(k, &timing),
         });
     }
     log.lidar = Some(bag.topics[taken].name.clone());
     log.source = source;
     Ok(log)
+}
+
+/// Wheel odometry over time.
+struct History<'a> {
+    /// In the order of the file.
+    all: &'a [Odometry],
+    /// In the order of their stamps, where these are of the same clock as the scans'.
+    by_stamp: Option<Vec<&'a Odometry>>,
+}
+
+impl<'a> History<'a> {
+    fn of(all: &'a [Odometry], scans: impl Iterator<Item = f64>) -> Self {
+        let mut sorted: Vec<&Odometry> = all.iter().collect();
+        sorted.sort_by(|a, b| a.header.seconds().total_cmp(&b.header.seconds()));
+        let mut stamps: Vec<f64> = scans.collect();
+        stamps.sort_by(f64::total_cmp);
+        let middle = stamps.get(stamps.len() / 2).copied().unwrap_or(0.0);
+        let ends = [sorted.first(), sorted.last()].map(|end| end.map(|end| end.header.seconds()));
+        let is_same_clock =
+            matches!(ends, [Some(first), Some(last)] if first <= middle && middle <= last);
+        Self {
+            all,
+            by_stamp: is_same_clock.then_some(sorted),
+        }
+    }
+
+    /// The last pose that was measured up to `end` (s); by clocks that do not agree, the last one in the file before.
+    fn at(&self, end: f64, before: usize) -> Option<&'a Odometry> {
+        match &self.by_stamp {
+            Some(sorted) => {
+                // Stamps of one moment that went through floating point.
+                let count = sorted.partition_point(|wheels| wheels.header.seconds() <= end + 1e-5);
+                sorted[..count].last().copied()
+            }
+            None => self.all[..before].last(),
+        }
+    }
 }
 
 /// Why a bag gives no scan.
@@ -122,23 +166,16 @@ fn timing(
     fitting: impl Fn(&[Timing]) -> order::Fit,
 ) -> (Timing, String) {
     let (step, scan_time) = (f64::from(first.time_step), f64::from(first.scan_time));
-    let candidates = Timing::candidates(step, scan_time, first.ranges.len());
     if let Some(order) = options.beams {
-        let told = candidates
-            .iter()
-            .find(|timing| timing.order == order && !timing.ends_at_stamp);
-        let timing = told.copied().unwrap_or(Timing {
-            order: Order::AtOnce,
-            step: 0.0,
-            ends_at_stamp: false,
-        });
+        let timing = Timing::told(order, step, scan_time, first.ranges.len());
         let note = if timing.order == order {
             format!(", beams {order} as told")
         } else {
-            format!(", beams at once: time_increment {step} s tells no {order}")
+            format!(", beams at once: the file states no time, so none to be {order} in")
         };
         return (timing, note);
     }
+    let candidates = Timing::candidates(step);
     let fit = fitting(&candidates);
     let timing = fit.timing.unwrap_or(candidates[0]);
     let note = if fit.gain > 0.0 {
@@ -248,6 +285,3 @@ impl Choice {
         text
     }
 }
-
-#[cfg(test)]
-mod tests;

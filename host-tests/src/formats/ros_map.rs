@@ -1,34 +1,123 @@
-//! Maps as ROS's `map_server` keeps them: a YAML file beside a PGM picture.
+//! Maps as ROS's `map_server` keeps them: a YAML file beside a picture (PGM, PNG or BMP).
 //!
 //! `image`, `resolution` (m), `origin` (`[x, y, yaw]` of the lower left corner), `negate`, `occupied_thresh`,
 //! `free_thresh`, and `mode`: `trinary` (the default), `scale` or `raw`. The picture's first row is the map's last.
 
-use std::fmt::Write as _;
+mod header;
+mod picture;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result};
 use beamfix::geometry::Pose;
 use beamfix::grid::{Grid, Shape, distance, occupancy};
 
 use beamfix_sim::world::World;
 
+use self::header::Header;
+use self::picture::{Picture, Pixel};
+
 /// A map in memory: [`occupancy`] bytes.
 pub type Map = Grid<Vec<u8>>;
 
-/// Widest and highest map that is read (cells).
-pub const MAX_SIDE: usize = 4096;
+/// Maps of more cells than this are cropped to what is known, where that is less than half.
+const LARGE: usize = 1 << 20;
+/// Unknown cells that a cropped map keeps around what is known: as far as a field reaches from a wall, 1 m at 5 cm.
+const BORDER: i32 = 20;
 
 /// Reads a map; an error says which file is wrong, and how.
 pub fn read(yaml: &Path) -> Result<Map> {
-    let text = fs::read_to_string(yaml).with_context(|| yaml.display().to_string())?;
-    let header = Header::parse(&text).with_context(|| yaml.display().to_string())?;
+    read_remarking(yaml, &mut Vec::new())
+}
+
+/// [`read`], with remarks of one line each about what is odd.
+pub fn read_remarking(yaml: &Path, remarks: &mut Vec<String>) -> Result<Map> {
+    let name = || yaml.display().to_string();
+    let header = Header::read(yaml)?;
     let image = yaml.parent().unwrap_or(Path::new("")).join(&header.image);
-    let bytes = fs::read(&image).with_context(|| image.display().to_string())?;
-    let picture = Picture::parse(&bytes).with_context(|| image.display().to_string())?;
-    header
-        .map(&picture)
-        .with_context(|| yaml.display().to_string())
+    let picture = Picture::read(&image)?;
+    let map = of_picture(&header, &picture).with_context(name)?;
+    if header.frees_the_unknown() {
+        let columns = 0..picture.width();
+        let is_unknown = |x, y| picture.pixel(x, y).shade == Pixel::UNKNOWN.shade;
+        let count: usize = columns
+            .map(|x| (0..picture.height()).filter(|&y| is_unknown(x, y)).count())
+            .sum();
+        if count > 0 {
+            remarks.push(format!(
+                "{}: free_thresh {} makes {count} cells of grey 205 free, which map savers write for unknown: 0.196 keeps them unknown",
+                yaml.display(),
+                header.free
+            ));
+        }
+    }
+    let cropped = cropped(map)?;
+    if (cropped.shape().width(), cropped.shape().height())
+        != (picture.width() as u16, picture.height() as u16)
+    {
+        remarks.push(format!(
+            "{}: {} x {} cells, cropped to the {} x {} around what is known",
+            yaml.display(),
+            picture.width(),
+            picture.height(),
+            cropped.shape().width(),
+            cropped.shape().height()
+        ));
+    }
+    Ok(cropped)
+}
+
+fn of_picture(header: &Header, picture: &Picture) -> Result<Map> {
+    let [x, y, yaw] = header.origin;
+    let shape = Shape::new(
+        picture.width(),
+        picture.height(),
+        header.resolution,
+        Pose::new(x, y, yaw),
+    )?;
+    let mut cells = Vec::with_capacity(shape.len());
+    for row in (0..picture.height()).rev() {
+        cells.extend((0..picture.width()).map(|x| header.byte(picture.pixel(x, row))));
+    }
+    Ok(Map::new(shape, cells)?)
+}
+
+/// A large map without the unknown cells around it.
+fn cropped(map: Map) -> Result<Map> {
+    let shape = *map.shape();
+    let (width, height) = (i32::from(shape.width()), i32::from(shape.height()));
+    if shape.len() <= LARGE {
+        return Ok(map);
+    }
+    let (mut low, mut high) = ([width, height], [0, 0]);
+    for (k, &byte) in map.cells().iter().enumerate() {
+        if byte != occupancy::UNKNOWN {
+            let at = [k as i32 % width, k as i32 / width];
+            for axis in 0..2 {
+                low[axis] = low[axis].min(at[axis]);
+                high[axis] = high[axis].max(at[axis] + 1);
+            }
+        }
+    }
+    let ends = [width, height];
+    for axis in 0..2 {
+        low[axis] = (low[axis] - BORDER).max(0);
+        high[axis] = (high[axis] + BORDER).min(ends[axis]);
+    }
+    let sides = [high[0] - low[0], high[1] - low[1]];
+    if sides.iter().any(|side| *side <= 0) || 2 * sides[0] * sides[1] > width * height {
+        return Ok(map);
+    }
+    let step = |cells: i32| cells as f32 * shape.resolution();
+    let corner = shape.origin() * Pose::new(step(low[0]), step(low[1]), 0.0);
+    let part = Shape::new(sides[0] as u32, sides[1] as u32, shape.resolution(), corner)?;
+    let mut cells = Vec::with_capacity(part.len());
+    for y in low[1]..high[1] {
+        let start = (y * width + low[0]) as usize;
+        cells.extend_from_slice(&map.cells()[start..start + sides[0] as usize]);
+    }
+    Ok(Map::new(part, cells)?)
 }
 
 /// Writes a map as `path` and, beside it, a picture of the same name with `.pgm`: trinary.
@@ -112,235 +201,46 @@ pub fn of_world(
     Ok(map)
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Mode {
-    Trinary,
-    Scale,
-    Raw,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use beamfix::geometry::Point;
 
-#[derive(Debug)]
-struct Header {
-    image: String,
-    resolution: f32,
-    origin: [f32; 3],
-    negate: bool,
-    occupied: f64,
-    free: f64,
-    mode: Mode,
-}
-
-impl Header {
-    fn parse(text: &str) -> Result<Self> {
-        let value = |key: &str| {
-            text.lines().find_map(|line| {
-                let line = line.split(" #").next().unwrap_or(line);
-                let (name, value) = line.split_once(':')?;
-                (name.trim() == key).then(|| value.trim().trim_matches(['"', '\'']).to_owned())
-            })
-        };
-        let needed = |key: &str| value(key).with_context(|| format!("no {key:?}"));
-        let number = |key: &str, text: &str| -> Result<f64> {
-            let number: f64 = text
-                .trim()
-                .parse()
-                .with_context(|| format!("{key}: {text:?} is no number"))?;
-            ensure!(number.is_finite(), "{key}: {text} is not finite");
-            Ok(number)
-        };
-        let origin = needed("origin")?;
-        let parts: Vec<&str> = origin.trim_matches(['[', ']']).split(',').collect();
-        ensure!(
-            parts.len() == 3,
-            "origin: {origin} has {} numbers, not x, y and yaw",
-            parts.len()
+    /// nav2 places cell (column, row from below) with its middle half a cell beyond the corner, turned by the yaw.
+    #[test]
+    fn cells_lie_where_nav2_puts_them() {
+        let yaml = "image: m.pgm\nresolution: 0.5\norigin: [10, -4, 1.5707963]\nnegate: 0\n\
+                    occupied_thresh: 0.65\nfree_thresh: 0.196\n";
+        // Black is the lower left pixel's right neighbour.
+        let pgm = b"P2\n3 2\n255\n254 254 254\n254 0 254\n";
+        let header = Header::parse(yaml).expect("a header");
+        let map = of_picture(&header, &Picture::parse(pgm).expect("a picture")).expect("a map");
+        assert_eq!(map.get(1, 0), Some(occupancy::OCCUPIED));
+        let middle = map.shape().middle_of(1, 0);
+        // 0.75 m along the map's x, which points along the world's y, and 0.25 m along its own y.
+        assert!(
+            (middle.x - 9.75).abs() < 1e-5 && (middle.y + 3.25).abs() < 1e-5,
+            "{middle:?}"
         );
-        let mut place = [0.0; 3];
-        for (place, part) in place.iter_mut().zip(&parts) {
-            *place = number("origin", part)? as f32;
-        }
-        let threshold = |key: &str, default: f64| match value(key) {
-            Some(text) => number(key, &text),
-            None => Ok(default),
-        };
-        let (occupied, free) = (
-            threshold("occupied_thresh", 0.65)?,
-            threshold("free_thresh", 0.196)?,
-        );
-        ensure!(
-            (0.0..=1.0).contains(&free) && (free..=1.0).contains(&occupied),
-            "thresholds: free {free} and occupied {occupied} are not in order between 0 and 1"
-        );
-        let mode = match value("mode").as_deref() {
-            None | Some("trinary") => Mode::Trinary,
-            Some("scale") => Mode::Scale,
-            Some("raw") => Mode::Raw,
-            Some(other) => bail!("mode: {other:?} is none of trinary, scale and raw"),
-        };
-        let negate = match value("negate").as_deref() {
-            None | Some("0" | "false") => false,
-            Some("1" | "true") => true,
-            Some(other) => bail!("negate: {other:?} is neither 0 nor 1"),
-        };
-        let image = needed("image")?;
-        ensure!(!image.is_empty(), "image: no name");
-        Ok(Self {
-            image,
-            resolution: number("resolution", &needed("resolution")?)? as f32,
-            origin: place,
-            negate,
-            occupied,
-            free,
-            mode,
-        })
+        assert_eq!(map.shape().cell_of(Point::new(9.75, -3.25)), (1, 0));
     }
 
-    fn map(&self, picture: &Picture) -> Result<Map> {
-        let [x, y, yaw] = self.origin;
-        let shape = Shape::new(
-            picture.width as u32,
-            picture.height as u32,
-            self.resolution,
-            Pose::new(x, y, yaw),
-        )?;
-        let mut cells = Vec::with_capacity(shape.len());
-        for row in picture.pixels.chunks(picture.width).rev() {
-            cells.extend(row.iter().map(|&pixel| self.byte(pixel, picture.most)));
+    #[test]
+    fn large_maps_are_cropped_to_what_is_known_and_stay_in_place() {
+        let shape = Shape::new(2000, 1500, 0.05, Pose::new(-50.0, -30.0, 0.3)).expect("a shape");
+        let mut map = Map::new(shape, vec![occupancy::UNKNOWN; shape.len()]).expect("cells");
+        for (x, y) in [(700, 400), (900, 650)] {
+            *map.get_mut(x, y).expect("on the map") = occupancy::OCCUPIED;
         }
-        Ok(Map::new(shape, cells)?)
-    }
-
-    /// The occupancy byte of a pixel.
-    fn byte(&self, pixel: u16, most: u16) -> u8 {
-        if self.mode == Mode::Raw {
-            return match pixel {
-                value @ 0..=100 => log_odds(f64::from(value) / 100.0),
-                _ => occupancy::UNKNOWN,
-            };
-        }
-        let light = f64::from(pixel) / f64::from(most);
-        let probability = if self.negate { light } else { 1.0 - light };
-        if probability > self.occupied {
-            occupancy::OCCUPIED
-        } else if probability < self.free {
-            occupancy::FREE
-        } else if self.mode == Mode::Scale {
-            log_odds((probability - self.free) / (self.occupied - self.free).max(1e-9))
-        } else {
-            occupancy::UNKNOWN
+        let places = [(700, 400), (900, 650)].map(|(x, y)| shape.middle_of(x, y));
+        let small = cropped(map).expect("a part");
+        let part = small.shape();
+        assert_eq!((part.width(), part.height()), (241, 291));
+        for place in places {
+            let (x, y) = part.cell_of(place);
+            assert_eq!(small.get(x, y), Some(occupancy::OCCUPIED), "{place:?}");
+            let off = part.middle_of(x, y);
+            assert!((off.x - place.x).abs() < 1e-4 && (off.y - place.y).abs() < 1e-4);
         }
     }
-}
-
-fn log_odds(probability: f64) -> u8 {
-    let p = probability.clamp(0.0005, 0.9995);
-    let odds = libm::round(8.0 * libm::log(p / (1.0 - p))) as i32;
-    (128 + 2 * odds).clamp(i32::from(occupancy::FREE), i32::from(occupancy::OCCUPIED)) as u8
-}
-
-/// A grey picture.
-struct Picture {
-    width: usize,
-    height: usize,
-    most: u16,
-    pixels: Vec<u16>,
-}
-
-impl Picture {
-    /// Binary (P5) and plain (P2) PGM.
-    fn parse(bytes: &[u8]) -> Result<Self> {
-        let mut at = 0;
-        let kind = word(bytes, &mut at).unwrap_or_default();
-        ensure!(
-            kind == "P5" || kind == "P2",
-            "not a PGM picture: it starts with {:?}",
-            head(bytes)
-        );
-        let mut field = |name: &str| -> Result<usize> {
-            let text = word(bytes, &mut at)
-                .with_context(|| format!("the picture ends before its {name}"))?;
-            text.parse()
-                .with_context(|| format!("the picture's {name} {text:?} is no number"))
-        };
-        let (width, height, most) = (field("width")?, field("height")?, field("largest value")?);
-        ensure!(
-            (1..=MAX_SIDE).contains(&width) && (1..=MAX_SIDE).contains(&height),
-            "a picture of {width} x {height} pixels: each side must be 1 to {MAX_SIDE}"
-        );
-        ensure!(
-            (1..=65_535).contains(&most),
-            "largest value {most}: it must be 1 to 65535"
-        );
-        let count = width * height;
-        let pixels: Vec<u16> = if kind == "P2" {
-            let mut pixels = Vec::with_capacity(count);
-            while pixels.len() < count {
-                let Some(text) = word(bytes, &mut at) else {
-                    break;
-                };
-                pixels.push(
-                    text.parse()
-                        .with_context(|| format!("pixel {} is {text:?}", pixels.len()))?,
-                );
-            }
-            pixels
-        } else {
-            // One white-space character after the header.
-            let data = bytes.get(at + 1..).unwrap_or(&[]);
-            if most > 255 {
-                data.chunks_exact(2)
-                    .take(count)
-                    .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
-                    .collect()
-            } else {
-                data.iter()
-                    .take(count)
-                    .map(|&byte| u16::from(byte))
-                    .collect()
-            }
-        };
-        ensure!(
-            pixels.len() == count,
-            "the picture is cut off: {} of {width} x {height} = {count} pixels",
-            pixels.len()
-        );
-        Ok(Self {
-            width,
-            height,
-            most: most as u16,
-            pixels,
-        })
-    }
-}
-
-/// The next word of a PGM's header, over comments.
-fn word(bytes: &[u8], at: &mut usize) -> Option<String> {
-    while let Some(&byte) = bytes.get(*at) {
-        if byte == b'#' {
-            *at += bytes[*at..]
-                .iter()
-                .position(|&b| b == b'\n')
-                .unwrap_or(bytes.len() - *at);
-        } else if byte.is_ascii_whitespace() {
-            *at += 1;
-        } else {
-            break;
-        }
-    }
-    let rest = bytes.get(*at..)?;
-    let length = rest
-        .iter()
-        .position(u8::is_ascii_whitespace)
-        .unwrap_or(rest.len())
-        .min(20);
-    *at += length;
-    (length > 0).then(|| String::from_utf8_lossy(&rest[..length]).into_owned())
-}
-
-fn head(bytes: &[u8]) -> String {
-    let mut text = String::new();
-    for byte in bytes.iter().take(8) {
-        let _ = write!(text, "{}", byte.escape_ascii());
-    }
-    text
 }

@@ -62,6 +62,20 @@ impl McapFile {
         })
     }
 
+    /// Keeps a file's bytes inside, as they are.
+    pub fn attach(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        let attachment = mcap::Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: name.to_owned(),
+            media_type: "application/octet-stream".into(),
+            data: bytes.into(),
+        };
+        self.writer
+            .attach(&attachment)
+            .with_context(|| self.name.clone())
+    }
+
     /// Writes one moment: the points in the robot's frame, and the poses in the order given to [`McapFile::create`].
     pub fn push(
         &mut self,

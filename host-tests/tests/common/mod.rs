@@ -1,6 +1,7 @@
 //! What tests share.
 #![allow(dead_code)]
 
+pub mod bag;
 pub mod cable;
 pub mod figures;
 pub mod tool;

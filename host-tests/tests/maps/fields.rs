@@ -248,18 +248,14 @@ fn bad_maps_are_refused_with_a_line_that_says_why() {
     let yaml = "image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
     let swap = |from: &str, to: &str| yaml.replace(from, to);
     for (yaml, picture, says) in [
-        (
-            yaml.to_owned(),
-            picture[..15].to_vec(),
-            "cut off: 4 of 4 x 3 = 12",
-        ),
-        (yaml.to_owned(), b"P6 4 3 255\n".to_vec(), "not a PGM"),
-        (yaml.to_owned(), b"".to_vec(), "not a PGM"),
-        (yaml.to_owned(), b"P5 4".to_vec(), "before its height"),
+        (yaml.to_owned(), picture[..15].to_vec(), "cut off"),
+        (yaml.to_owned(), b"GIF89a".to_vec(), "not a PGM"),
+        (yaml.to_owned(), b"".to_vec(), "empty"),
+        (yaml.to_owned(), b"P5 4".to_vec(), "cannot be read"),
         (yaml.to_owned(), b"P5 0 3 255\n".to_vec(), "0 x 3"),
         (yaml.to_owned(), b"P5 99999 3 255\n".to_vec(), "99999 x 3"),
-        (yaml.to_owned(), b"P5 4 3 0\n".to_vec(), "largest value 0"),
-        (yaml.to_owned(), b"P5 4 x 255\n".to_vec(), "no number"),
+        (yaml.to_owned(), b"P5 4 3 0\n".to_vec(), "cannot be read"),
+        (yaml.to_owned(), b"P5 4 x 255\n".to_vec(), "cannot be read"),
         (swap("0, 0, 0", "0, nan, 0"), picture.clone(), "not finite"),
         (swap("0, 0, 0", "0, 0"), picture.clone(), "2 numbers"),
         (swap("0.05", "zero"), picture.clone(), "no number"),
@@ -277,6 +273,7 @@ fn bad_maps_are_refused_with_a_line_that_says_why() {
             "thresholds",
         ),
         (swap("m.pgm", "none.pgm"), picture.clone(), "none.pgm"),
+        (swap("m.pgm", "/dev/zero"), picture.clone(), "not a file"),
     ] {
         let path = folder.join("m.yaml");
         fs::write(&path, &yaml).expect("written");

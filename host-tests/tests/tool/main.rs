@@ -4,5 +4,6 @@ mod cli;
 #[path = "../common/mod.rs"]
 mod common;
 mod fields;
+mod recordings;
 mod scenes;
 mod watch;

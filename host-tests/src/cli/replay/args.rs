@@ -1,5 +1,7 @@
 //! What `replay` takes.
 
+use std::fs::File;
+use std::io::BufWriter;
 use std::path::PathBuf;
 
 use anyhow::{Result, bail, ensure};
@@ -7,9 +9,11 @@ use beamfix::geometry::Pose;
 use beamfix::scan::Mount;
 use clap::ValueEnum;
 use host_tests::formats::order::Order;
+use host_tests::formats::trajectory::{Format, Trajectory};
 use host_tests::formats::{Log, Options};
 use host_tests::report::picture;
 
+use crate::cli::output;
 use crate::cli::prior::Prior;
 
 /// About so many scans are drawn into a picture.
@@ -43,9 +47,12 @@ pub struct Args {
     /// The memory configuration. Default: the smallest one with room for the log's scans.
     #[arg(long, value_enum)]
     pub tier: Option<Tier>,
-    /// Where to write a line `timestamp x y theta` for every scan.
+    /// Where to write a line `timestamp x y theta` for every scan; ` # guess` after it where no match confirms it.
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
+    /// How the trajectory is written: `timestamp x y theta`, or as evo reads it.
+    #[arg(long, value_enum, default_value_t = Format::Plain)]
+    pub trajectory_format: Format,
     /// The map to localize in: a ROS map's YAML file, or a table that `field` wrote. Only read, with --mode localize.
     #[arg(long, value_name = "FILE")]
     pub map: Option<PathBuf>,
@@ -126,6 +133,7 @@ impl Args {
             beams: self.beams,
             scan_topic: self.scan_topic.clone(),
             odom_topic: self.odom_topic.clone(),
+            mount: self.mount,
         }
     }
 
@@ -137,6 +145,12 @@ impl Args {
     /// Whether wheels and gyroscope of the log are the guess.
     pub fn uses_wheels(&self) -> bool {
         self.prior == Prior::Odometry
+    }
+
+    /// Begins the trajectory, where one is written.
+    pub fn open_trajectory(&self) -> Result<Option<Trajectory<BufWriter<File>>>> {
+        let file = self.trajectory.as_deref().map(output::create).transpose()?;
+        Ok(file.map(|file| Trajectory::new(file, self.trajectory_format)))
     }
 
     /// How many of a log's scans are replayed.

@@ -1,7 +1,5 @@
 //! `replay --mode localize`: where the robot is in a map, over a recorded log.
 
-use std::io::Write;
-
 use anyhow::{Context, Result};
 use beamfix::geometry::Pose;
 use beamfix::localization::{Localizer, LocalizerConfig};
@@ -19,6 +17,7 @@ use host_tests::sized;
 use serde_json::json;
 
 use super::args::{Args, DRAWN};
+use super::{Done, add_context};
 use crate::cli::output;
 
 /// What a replay in a map came to.
@@ -37,14 +36,14 @@ struct Outcome {
 }
 
 /// Localizes the log with room for `size` beams a revolution, and reports.
-pub fn run(args: &Args, log: &Log, size: usize) -> Result<()> {
+pub fn run(args: &Args, log: &Log, size: usize) -> Result<Done> {
     let outcome = sized!(size, in_map(args, log))?;
-    let value = json!({
+    let mut value = json!({
         "scans": outcome.scans, "refused": outcome.scans - outcome.tracked, "keyframes": 0, "loops": 0,
         "tracked": outcome.tracked, "doubtful": outcome.doubtful, "lost": outcome.lost, "searches": outcome.searches,
-        "beams": size, "refused_beams": outcome.refused_beams, "skipped": log.skipped,
-        "pose_hash": outcome.hash.to_string(),
+        "beams": size, "refused_beams": outcome.refused_beams, "pose_hash": outcome.hash.to_string(),
     });
+    add_context(&mut value, args, log, outcome.last);
     let Pose { x, y, theta } = outcome.last;
     let text = format!(
         "{} scans, {} with a pose, {} doubtful, {} times lost, {} searches\n\
@@ -58,13 +57,19 @@ pub fn run(args: &Args, log: &Log, size: usize) -> Result<()> {
         outcome.hash
     );
     output::report(args.json, &value, &text)?;
-    Ok(())
+    Ok(Done {
+        scans: outcome.scans,
+        measured: outcome.tracked,
+        references: None,
+    })
 }
 
-/// Localizes every scan; a scan without a pose repeats the last one.
+/// Localizes every scan; a scan without a pose repeats the last one, marked as a guess.
 fn in_map<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
     let path = args.map.as_deref().context("--map is missing")?;
-    let file = FieldFile::read(path)?;
+    let mut remarks = Vec::new();
+    let file = FieldFile::read(path, &mut remarks)?;
+    output::remark(&remarks);
     let field = file.field()?;
     let mut buffer = vec![0; Pyramid::bytes(field.grid().shape())];
     let pyramid = Pyramid::new(field, &mut buffer)?;
@@ -78,7 +83,7 @@ fn in_map<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
     if let Some(start) = args.start {
         localizer.start_at(start);
     }
-    let mut trajectory = args.trajectory.as_deref().map(output::create).transpose()?;
+    let mut trajectory = args.open_trajectory()?;
     let count = args.count(log.scans.len());
     let bar = output::progress(count, "localizing");
     let mut track = Track::new(
@@ -105,15 +110,15 @@ fn in_map<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
             track.push(at, &scan.beams);
         }
         if let Some(file) = &mut trajectory {
-            let Pose { x, y, theta } = pose;
-            writeln!(file, "{} {x} {y} {theta}", scan.stamp)?;
+            let is_guess = located.verdict() != Verdict::Measured;
+            file.push(&scan.stamp, pose, is_guess)?;
         }
         bar.inc(1);
         Ok(())
     })?;
     bar.finish_and_clear();
-    if let Some(mut file) = trajectory {
-        file.flush()?;
+    if let Some(file) = trajectory {
+        file.finish()?;
     }
     if let Some(path) = &args.picture {
         let caption = format!("{count} scans, pose hash {}", followed.hash);

@@ -1,10 +1,8 @@
 //! `replay --mode odometry`: motion from scan to scan, over a recorded log.
 
-use std::io::Write;
-
 use anyhow::Result;
 use beamfix::geometry::Pose;
-use beamfix::odometry::{Counters, Odometry};
+use beamfix::odometry::{Counters, Odometry, Refusal};
 use beamfix_sim::TruePose;
 use host_tests::formats::Log;
 use host_tests::pipeline::{Followed, config, follow};
@@ -14,22 +12,24 @@ use host_tests::sized;
 use serde_json::json;
 
 use super::args::{Args, DRAWN};
+use super::{Done, add_context};
 use crate::cli::output;
 
 /// Replays the log with room for `size` beams a revolution and so many directions, and reports.
-pub fn run(args: &Args, log: &Log, (size, directions): (usize, usize)) -> Result<()> {
+pub fn run(args: &Args, log: &Log, (size, directions): (usize, usize)) -> Result<Done> {
     let outcome = sized!(size, replay(args, log, directions))?;
+    let (counters, measured) = outcome.estimator;
     let Counters {
-        scans,
-        refused,
-        keyframes,
-        lost,
-    } = outcome.estimator;
-    let value = json!({
+        keyframes, lost, ..
+    } = counters;
+    let scans = outcome.scans;
+    // A scan before the first reference has no pose of its own either.
+    let refused = scans - measured;
+    let mut value = json!({
         "scans": scans, "refused": refused, "keyframes": keyframes, "lost": lost, "loops": 0,
-        "beams": size, "refused_beams": outcome.refused_beams, "skipped": log.skipped, "bad_readings": log.odd.bad,
-        "pose_hash": outcome.hash.to_string(),
+        "beams": size, "refused_beams": outcome.refused_beams, "pose_hash": outcome.hash.to_string(),
     });
+    add_context(&mut value, args, log, outcome.last);
     let Pose { x, y, theta } = outcome.last;
     let mut text = format!(
         "{scans} scans, {refused} refused, {keyframes} keyframes, {lost} times lost\n\
@@ -44,12 +44,22 @@ pub fn run(args: &Args, log: &Log, (size, directions): (usize, usize)) -> Result
         );
     }
     output::report(args.json, &value, &text)?;
-    Ok(())
+    // The first reference alone is a pose by definition, and the work is done only where it was all there was.
+    let is_matched = measured > 1 || scans == 1;
+    Ok(Done {
+        scans,
+        measured: if is_matched { measured } else { 0 },
+        references: Some(keyframes),
+    })
 }
 
-fn replay<const N: usize>(args: &Args, log: &Log, directions: usize) -> Result<Followed<Counters>> {
+/// The counters, and how many poses are measured.
+type Counted = (Counters, usize);
+
+fn replay<const N: usize>(args: &Args, log: &Log, directions: usize) -> Result<Followed<Counted>> {
     let mount = args.mount_of(log);
-    let mut trajectory = args.trajectory.as_deref().map(output::create).transpose()?;
+    let mut trajectory = args.open_trajectory()?;
+    let mut measured = 0;
     let count = args.count(log.scans.len());
     let bar = output::progress(count, "replaying");
     let mut track = Track::new(
@@ -60,9 +70,12 @@ fn replay<const N: usize>(args: &Args, log: &Log, directions: usize) -> Result<F
     let start = log.scans.iter().find_map(|scan| scan.wheels);
     let odometry = Odometry::<N>::new(config(mount, directions));
     let ego = (count, args.uses_wheels());
-    let followed = follow(log, ego, odometry, &mut |scan, pose, _| {
+    let followed = follow(log, ego, odometry, &mut |scan, pose, step| {
+        let is_first = step.keyframe && step.outcome == Err(Refusal::First);
+        let is_measured = step.outcome.is_ok() || is_first;
+        measured += usize::from(is_measured);
         if let Some(file) = &mut trajectory {
-            writeln!(file, "{} {} {} {}", scan.stamp, pose.x, pose.y, pose.theta)?;
+            file.push(&scan.stamp, pose, !is_measured)?;
         }
         if args.picture.is_some() {
             let us = scan.beams.last().map_or(0, |beam| beam.time_us);
@@ -89,8 +102,8 @@ fn replay<const N: usize>(args: &Args, log: &Log, directions: usize) -> Result<F
             path,
         )?;
     }
-    if let Some(mut file) = trajectory {
-        file.flush()?;
+    if let Some(file) = trajectory {
+        file.finish()?;
     }
-    Ok(followed.map(|odometry| odometry.counters()))
+    Ok(followed.map(|odometry| (odometry.counters(), measured)))
 }

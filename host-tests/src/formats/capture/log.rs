@@ -108,7 +108,7 @@ pub fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Result<Log
             _ => None,
         });
     let mut log = Log {
-        cut: content.cut,
+        cut: content.cut.or_else(|| capture::cut(&content.bytes)),
         mount: Mount {
             robot_from_lidar: mount.unwrap_or(Pose::IDENTITY),
             ..Mount::DEFAULT
