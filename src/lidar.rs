@@ -55,6 +55,7 @@ pub use bringup::{choice, identify, motor, startup};
 pub use model::{Family, Model, Motor, Proof, Start};
 #[cfg(feature = "internals")]
 pub use sensors::*;
+pub use wire::counters::Counters;
 #[cfg(any(
     feature = "embedded-io",
     feature = "embedded-io-async",
@@ -62,7 +63,7 @@ pub use sensors::*;
 ))]
 pub use wire::io;
 pub use wire::packet::{Packet, Sample};
-pub use wire::protocol::{Counters, Protocol};
+pub use wire::protocol::Protocol;
 pub use wire::request::Request;
 #[cfg(feature = "internals")]
 pub use wire::{

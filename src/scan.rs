@@ -20,6 +20,7 @@ pub mod filter;
 pub(crate) mod mount;
 #[cfg(feature = "internals")]
 pub mod mount;
+mod point;
 #[cfg(not(feature = "internals"))]
 pub(crate) mod points;
 #[cfg(feature = "internals")]
@@ -32,7 +33,8 @@ pub use assembler::Assembler;
 pub use beam::{Beam, Bearing, NoReturn, Range};
 pub use filter::FilterConfig;
 pub use mount::Mount;
-pub use points::{Points, PointsConfig, ScanPoint};
+pub use point::ScanPoint;
+pub use points::{Points, PointsConfig};
 
 use heapless::Vec;
 

@@ -7,7 +7,7 @@ use crate::{
     config::{self, ConfigError},
     geometry::Pose,
     math,
-    scan::points::ScanPoint,
+    scan::ScanPoint,
 };
 
 /// Nothing known: even odds.

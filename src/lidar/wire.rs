@@ -6,6 +6,7 @@
 
 pub(crate) mod angle;
 pub(crate) mod answer;
+pub(crate) mod counters;
 pub mod framing;
 #[cfg(any(
     feature = "embedded-io",

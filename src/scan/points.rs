@@ -4,22 +4,8 @@ use crate::{
     config::{self, ConfigError},
     geometry::Twist,
     math,
-    scan::{Bearing, Mount, Scan, Stored, surface::across_mm},
+    scan::{Bearing, Mount, Scan, ScanPoint, Stored, surface::across_mm},
 };
-
-/// A place hit by a beam: 8 bytes, all integers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[repr(align(4))]
-pub struct ScanPoint {
-    /// Forward of the lidar (mm).
-    pub x: i16,
-    /// Left of the lidar (mm).
-    pub y: i16,
-    /// Direction from the lidar.
-    pub bearing: Bearing,
-    /// Distance from the lidar (mm), at most [`Points::MAX_RANGE_MM`].
-    pub range: u16,
-}
 
 /// What [`Points::assign`] takes and leaves out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -214,21 +200,6 @@ const MAX_RANGE_MM: u16 = 32_000;
 fn millimetres(metres: f32) -> u16 {
     let mm = math::to_mm(metres);
     if mm > MAX_RANGE_MM { MAX_RANGE_MM } else { mm }
-}
-
-impl ScanPoint {
-    /// The point `range` millimetres away, at most 32 767.
-    #[must_use]
-    pub const fn at(bearing: Bearing, range: u16) -> Self {
-        let (s, c) = math::sin_cos_q15(bearing.0);
-        let r = range as i32;
-        Self {
-            x: ((r * c + (1 << 14)) >> 15) as i16,
-            y: ((r * s + (1 << 14)) >> 15) as i16,
-            bearing,
-            range,
-        }
-    }
 }
 
 /// Motion of the lidar during the sweep, undone beam by beam.

@@ -30,7 +30,7 @@ pub mod tiles;
 use crate::{
     grid::{Grid, GridError, Shape, occupancy},
     math,
-    scan::points::ScanPoint,
+    scan::ScanPoint,
 };
 pub use access::{Field, Score};
 #[cfg(feature = "internals")]

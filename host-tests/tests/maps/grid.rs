@@ -8,7 +8,7 @@ use beamfix::{
         distance::{self, FAR, Scratch},
         occupancy::{self, Cell, UpdateConfig},
     },
-    scan::{Bearing, points::ScanPoint},
+    scan::{Bearing, ScanPoint},
 };
 use beamfix_sim::noise::Noise;
 

@@ -5,7 +5,7 @@
 //! lost, and neither is a frame that begins inside the ruins of another. Of 1875 LD19 frames with 400 random faults
 //! this keeps 1487; a parser that drops the whole failed frame keeps 1398.
 
-use super::protocol::Counters;
+use super::counters::Counters;
 
 /// What a protocol says about bytes that may begin a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

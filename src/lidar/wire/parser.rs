@@ -2,9 +2,9 @@
 
 use super::framing::{Framer, Verdict};
 use super::packet::Packet;
-use super::protocol::{Counters, Protocol};
 use super::survey::{self, Survey};
 use super::timing::Pace;
+use super::{counters::Counters, protocol::Protocol};
 
 /// What tells one framed protocol from another.
 pub trait Format {

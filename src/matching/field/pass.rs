@@ -3,7 +3,7 @@
 use core::num::Wrapping;
 
 use crate::{
-    scan::points::ScanPoint,
+    scan::ScanPoint,
     sensor_model::likelihood_field::{Field, Hessian, placement::Placement},
 };
 

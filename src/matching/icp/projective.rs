@@ -20,6 +20,7 @@
 //! What a pose is worth is judged apart from how it was found (`score`), so that several starts can compete.
 
 mod accumulate;
+mod line;
 mod multistart;
 mod normals;
 pub mod reference;
@@ -27,7 +28,8 @@ mod score;
 mod smoothing;
 mod verdict;
 
-pub use reference::{Line, Reference};
+pub use line::Line;
+pub use reference::Reference;
 
 use crate::{
     config::{self, ConfigError},

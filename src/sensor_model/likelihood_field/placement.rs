@@ -4,7 +4,7 @@ use crate::{
     geometry::{Point, Pose},
     grid::{GridError, Shape},
     math,
-    scan::points::ScanPoint,
+    scan::ScanPoint,
 };
 
 /// A lidar's pose on a grid. Coordinates are cells in `Q shift`, modulo 2³².

@@ -1,7 +1,7 @@
 //! One pass over the points: associate by projection, weigh, sum the normal equations. The hot loop, in integers.
 
 use crate::{
-    geometry::Pose, linalg::Sym3, matching::icp::projective::reference::Line, math, scan::ScanPoint,
+    geometry::Pose, linalg::Sym3, matching::icp::projective::line::Line, math, scan::ScanPoint,
 };
 
 /// A pose in whole numbers: what a pass works with.

@@ -5,7 +5,7 @@
 //! is borrowed from a neighbour that has a good one, else laid through three points, else it faces the lidar.
 
 use crate::{
-    matching::icp::projective::reference::Line,
+    matching::icp::projective::line::Line,
     math::{reciprocal, rough_length},
     scan::{
         ScanPoint,

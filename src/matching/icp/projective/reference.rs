@@ -1,47 +1,9 @@
 //! What a scan is matched against: a line for each direction, found without a search.
 
-use crate::{matching::icp::projective::normals, scan::ScanPoint};
-
-/// The surface seen in one direction, as a line through a point.
-///
-/// 12 bytes. The normal carries the line's weight: a residual computed with it is already divided by its own
-/// standard deviation, relative to that of a beam that hits head on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(align(4))]
-pub struct Line {
-    /// Point on the line (mm); -32 768 stands for no line.
-    pub qx: i16,
-    /// Point on the line (mm).
-    pub qy: i16,
-    /// Weighted normal, Q10: of length 1024 for a beam that hits head on, up to 5 times that for a grazing one.
-    pub mx: i16,
-    /// Weighted normal, Q10.
-    pub my: i16,
-    /// Direction of the point, divided by its distance and by the angle between two lines: its cross product with
-    /// another point (mm) is the number of lines between the two, Q16. At most 16 383, which falls short within a
-    /// hand's breadth of the lidar.
-    pub ux: i16,
-    /// As `ux`.
-    pub uy: i16,
-}
-
-impl Line {
-    /// No surface: a place that no point has, and a direction far off every point's.
-    pub const NONE: Self = Self {
-        qx: i16::MIN,
-        qy: 0,
-        mx: 0,
-        my: 0,
-        ux: 16_383,
-        uy: 0,
-    };
-
-    /// Whether a surface was seen there.
-    #[must_use]
-    pub const fn is_some(&self) -> bool {
-        self.qx != i16::MIN
-    }
-}
+use crate::{
+    matching::icp::projective::{line::Line, normals},
+    scan::ScanPoint,
+};
 
 /// A scan as lines by direction: the k-th of `n` lines is what the lidar saw at `k/n` of a turn.
 ///

@@ -3,7 +3,7 @@
 use crate::{
     matching::icp::projective::{
         accumulate::{FixedPose, Projection},
-        reference::Line,
+        line::Line,
     },
     math::{reciprocal, rough_length},
     scan::ScanPoint,

@@ -3,7 +3,7 @@
 use crate::{
     matching::icp::projective::{
         accumulate::{self, FixedPose, Projection},
-        reference::Line,
+        line::Line,
     },
     scan::{Points, ScanPoint},
 };
