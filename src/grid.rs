@@ -159,7 +159,7 @@ impl Shape {
 
     /// Where a point of the map lies on the grid, in cells: (0.5, 0.5) is the middle of the first cell.
     #[must_use]
-    pub fn to_cells(&self, point_in_map: Point) -> Point {
+    pub(crate) fn to_cells(&self, point_in_map: Point) -> Point {
         let point = self.origin.inverse() * point_in_map;
         Point::new(point.x / self.resolution, point.y / self.resolution)
     }

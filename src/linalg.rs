@@ -48,13 +48,13 @@ impl Covariance {
 
     /// Sum of two independent errors.
     #[must_use]
-    pub fn plus(&self, other: &Self) -> Self {
+    pub(crate) fn plus(&self, other: &Self) -> Self {
         Self(self.0.plus(&other.0))
     }
 
     /// The same error seen `(dx, dy)` (m) farther on, where an error of heading also is one of position.
     #[must_use]
-    pub fn transported(&self, dx: f32, dy: f32) -> Self {
+    pub(crate) fn transported(&self, dx: f32, dy: f32) -> Self {
         let m = &self.0;
         Self(Sym3 {
             xx: m.xx - 2.0 * dy * m.xt + dy * dy * m.tt,
@@ -70,7 +70,7 @@ impl Covariance {
     ///
     /// Only the rotation counts: errors of position turn with it, the error of the heading stays.
     #[must_use]
-    pub fn rotated(&self, pose: Pose) -> Self {
+    pub(crate) fn rotated(&self, pose: Pose) -> Self {
         let (s, c) = math::sin_cos(pose.theta);
         let m = &self.0;
         Self(Sym3 {

@@ -13,10 +13,6 @@ pub(crate) mod decimator;
 #[cfg(feature = "internals")]
 pub mod decimator;
 #[cfg(not(feature = "internals"))]
-pub(crate) mod filter;
-#[cfg(feature = "internals")]
-pub mod filter;
-#[cfg(not(feature = "internals"))]
 pub(crate) mod mount;
 #[cfg(feature = "internals")]
 pub mod mount;
@@ -31,7 +27,6 @@ pub(crate) mod thinning;
 
 pub use assembler::Assembler;
 pub use beam::{Beam, Bearing, NoReturn, Range};
-pub use filter::FilterConfig;
 pub use mount::Mount;
 pub use point::ScanPoint;
 pub use points::{Points, PointsConfig};

@@ -95,6 +95,7 @@ pub fn squared<const N: usize>(
 }
 
 /// Whole distances (cells), rounded down, as [`super::cast::Skipping`] wants them.
+#[cfg(feature = "internals")]
 pub fn roots(squares: &[u16], out: &mut [u8]) {
     for (&square, root) in squares.iter().zip(out) {
         *root = math::isqrt(u32::from(square)) as u8;

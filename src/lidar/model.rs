@@ -155,7 +155,7 @@ pub struct Model {
 impl Model {
     /// Time from one measurement to the next (µs/256).
     #[must_use]
-    pub const fn period_q8(&self) -> u32 {
+    pub(crate) const fn period_q8(&self) -> u32 {
         let rate = if self.points_per_s < 100 {
             100
         } else {

@@ -25,4 +25,8 @@ pub(crate) mod projective;
 #[cfg(feature = "internals")]
 pub mod projective;
 
-pub use projective::{IcpConfig, Line, Reference, Search, align, align_observed, smooth_towards};
+pub use projective::{IcpConfig, Reference, Search, align};
+#[cfg(not(feature = "internals"))]
+pub(crate) use projective::{Line, align_observed, smooth_towards};
+#[cfg(feature = "internals")]
+pub use projective::{Line, align_observed, smooth_towards};

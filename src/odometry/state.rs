@@ -66,12 +66,6 @@ impl<const N: usize> Odometry<N> {
         &self.deskewed.points
     }
 
-    /// The scan that the next one is matched against, and where the robot was.
-    #[must_use]
-    pub const fn keyframe(&self) -> &Keyframe<Reference<N>> {
-        &self.keyframe
-    }
-
     /// Scans, refusals and keyframes since the start.
     #[must_use]
     pub const fn counters(&self) -> Counters {

@@ -16,8 +16,8 @@ impl Bearing {
     }
 
     /// Nearest bearing to an angle that grows clockwise, in hundredths of a degree: the unit on most wires.
-    #[must_use]
-    pub const fn from_clockwise_cdeg(cdeg: u32) -> Self {
+    #[cfg(test)]
+    pub(crate) const fn from_clockwise_cdeg(cdeg: u32) -> Self {
         Self((0u16).wrapping_sub((((cdeg % 36_000) * 65_536 + 18_000) / 36_000) as u16))
     }
 

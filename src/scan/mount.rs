@@ -23,14 +23,14 @@ impl Mount {
 
     /// Motion of the lidar between two moments when the robot moves by `motion` between them.
     #[must_use]
-    pub fn lidar_motion(&self, motion: Pose) -> Pose {
+    pub(crate) fn lidar_motion(&self, motion: Pose) -> Pose {
         self.robot_from_lidar
             .between(motion * self.robot_from_lidar)
     }
 
     /// Velocity of the lidar, in its own frame, when the robot has `twist`.
     #[must_use]
-    pub fn lidar_twist(&self, twist: Twist) -> Twist {
+    pub(crate) fn lidar_twist(&self, twist: Twist) -> Twist {
         // The lidar's place moves with the robot and around it; then the axes turn to its own.
         let at = self.robot_from_lidar;
         let (vx, vy) = (twist.vx - twist.omega * at.y, twist.vy + twist.omega * at.x);
@@ -44,7 +44,7 @@ impl Mount {
 
     /// Motion of the robot when its lidar moves by `motion`: undoes [`Mount::lidar_motion`].
     #[must_use]
-    pub fn robot_motion(&self, motion: Pose) -> Pose {
+    pub(crate) fn robot_motion(&self, motion: Pose) -> Pose {
         self.robot_from_lidar * motion * self.robot_from_lidar.inverse()
     }
 }

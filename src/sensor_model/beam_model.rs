@@ -71,7 +71,7 @@ impl BeamModel {
     /// Weighted densities of the four causes: hit, unexpected, none, anything (1/m; a share for a beam without a
     /// return). `range` is `None` for a beam without a return.
     #[must_use]
-    pub fn causes(&self, range: Option<f32>, expected: f32) -> [f32; 4] {
+    pub(crate) fn causes(&self, range: Option<f32>, expected: f32) -> [f32; 4] {
         /// 1/√(2π).
         const PEAK: f32 = 0.398_942_28;
         let Some(z) = range.filter(|z| *z < self.range_max) else {

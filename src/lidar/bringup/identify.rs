@@ -9,10 +9,16 @@ mod hints;
 mod refine;
 mod search;
 
+#[cfg(feature = "internals")]
 pub use crate::lidar::wire::survey::Survey;
+#[cfg(not(feature = "internals"))]
+pub(crate) use crate::lidar::wire::survey::Survey;
 pub use finding::{Finding, identify};
 pub use hints::{Hint, hints};
+#[cfg(feature = "internals")]
 pub use search::survey_model;
+#[cfg(not(feature = "internals"))]
+pub(crate) use search::survey_model;
 
 /// Line speeds at which to listen, the commonest first (bits/s).
 pub const BAUDS: [u32; 8] = [

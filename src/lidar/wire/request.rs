@@ -16,7 +16,7 @@ pub struct Request {
 impl Request {
     /// No bytes.
     #[must_use]
-    pub const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self {
             bytes: [0; MAX_BYTES],
             len: 0,
@@ -25,7 +25,7 @@ impl Request {
 
     /// These pieces one after the other; what goes beyond [`MAX_BYTES`] is left out.
     #[must_use]
-    pub fn of(pieces: &[&[u8]]) -> Self {
+    pub(crate) fn of(pieces: &[&[u8]]) -> Self {
         let mut request = Self::new();
         for byte in pieces.iter().copied().flatten() {
             request.push(*byte);

@@ -159,7 +159,7 @@ impl Profile {
 
     /// Distance (mm) from which on a cell is worth less than an unexplored one: 2.8σ by default.
     #[must_use]
-    pub fn hit_reach_mm(&self) -> i32 {
+    pub(crate) fn hit_reach_mm(&self) -> i32 {
         let limit = u16::from(self.scale.unexplored) << 8;
         let steps = self.bytes.iter().take_while(|&&byte| byte >= limit).count() as u32;
         let square = (u64::from(steps) * u64::from(self.reach_mm2)) >> 8;

@@ -24,7 +24,7 @@ impl<const N: usize> Reference<N> {
 
     /// No lines; `directions` of them, at most N: matches do not depend on N then, only on this.
     #[must_use]
-    pub const fn with_directions(directions: u16) -> Self {
+    pub(crate) const fn with_directions(directions: u16) -> Self {
         let all = if N > u16::MAX as usize {
             u16::MAX
         } else {
