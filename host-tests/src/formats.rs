@@ -158,7 +158,7 @@ pub fn read_with(path: &Path, options: &Options) -> Result<Log> {
     if path.is_dir() {
         let log = ros::parse(ros::bag::Bag::of_folder(path)?, options)
             .map_err(|error| error.context(name.clone()))?;
-        return with_scans(log, &name, || String::new());
+        return with_scans(log, &name, String::new);
     }
     let content = bytes::load(path)?;
     if content.bytes.starts_with(capture::MAGIC) {

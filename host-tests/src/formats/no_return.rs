@@ -206,7 +206,7 @@ mod tests {
             // Beams of a degree on a wall across, from the middle outwards, over noise of a centimetre.
             ("a wall across", &|k| {
                 let bearing = ((k % 7) as f32 - 3.0).to_radians();
-                7.0 / bearing.cos() + 0.01 * (libm::sinf(k as f32 * 1.7) * 2.0).round()
+                7.0 / libm::cosf(bearing) + 0.01 * libm::roundf(libm::sinf(k as f32 * 1.7) * 2.0)
             }),
             ("one corner", &|k| {
                 if k % 7 == 3 {
