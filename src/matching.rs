@@ -3,13 +3,13 @@
 //! | matcher | from | to | use |
 //! | --- | --- | --- | --- |
 //! | [`icp::align`] | a guess | a scan | odometry: fast, in integers |
-//! | [`icp::modular::align`] | a guess | a scan | comparing and teaching: every stage a choice |
+//! | `icp::modular::align` | a guess | a scan | comparing and teaching: every stage a choice |
 //! | [`field::align`] | a guess | a likelihood field | tracking in a map |
 //! | [`correlative::Correlator::align`] | a window | a likelihood field | where the guess is too far off for the others |
-//! | [`map::align`] | a window | a grid | two maps, to check a closed loop |
+//! | `map::align` | a window | a grid | two maps, to check a closed loop |
 //!
 //! Each takes what is matched against, the points (or the second grid), a guess and settings, and gives a [`Match`]
-//! ([`map::MapMatch`]) or a [`MatchError`]; those with working memory also take that: the correlative matcher is a method of
+//! (`map::MapMatch`) or a [`MatchError`]; those with working memory also take that: the correlative matcher is a method of
 //! its memory, the modular ICP takes a workspace. `Ok` means usable: how far it can be trusted is in the covariance, and a
 //! direction that nothing determines is named and keeps the guess.
 

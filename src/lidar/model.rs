@@ -1,6 +1,6 @@
 //! One sensor as a row of data: which family's frames it sends, at what pace, and how it is started.
 //!
-//! The rows themselves stand in the files of [`super::sensors`], each beside the parser that reads it, and
+//! The rows themselves stand in the files of `lidar/sensors`, each beside the parser that reads it, and
 //! [`Model::ALL`] lists them.
 
 mod parameters;

@@ -8,7 +8,7 @@ use crate::{
 /// When to believe what.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalizerConfig {
-    /// Least quality of a scan that fits (−1…1): see [`Quality::value`](super::quality::Quality::value). Default 0.38.
+    /// Least quality of a scan that fits (−1…1): see `Quality::value`. Default 0.38.
     pub min_quality: f32,
     /// Least quality of a scan that leaves no doubt. Default 0.5.
     pub confident_quality: f32,

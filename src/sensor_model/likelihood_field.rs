@@ -79,7 +79,7 @@ impl<S: AsRef<[u8]>> LikelihoodField<S> {
 }
 
 impl<S: AsRef<[u8]> + AsMut<[u8]>> LikelihoodField<S> {
-    /// A field with nothing explored, for [`draw`].
+    /// A field with nothing explored, for `draw`.
     pub fn unexplored(shape: Shape, cells: S, scale: Scale) -> Result<Self, GridError> {
         let mut grid = Grid::new(shape, cells)?;
         grid.cells_mut().fill(scale.unexplored);

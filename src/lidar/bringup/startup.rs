@@ -119,7 +119,7 @@ impl Startup {
         }
     }
 
-    /// What a SCIP sensor measures, if it told: [`Parameters::steps`] are what its parser needs.
+    /// What a SCIP sensor measures, if it told: `Parameters::steps` are what its parser needs.
     #[must_use]
     pub fn parameters(&self) -> Option<Parameters> {
         match &self.talk {

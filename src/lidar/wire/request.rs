@@ -5,7 +5,7 @@ use core::ops::Deref;
 /// Most bytes of a request.
 pub const MAX_BYTES: usize = 24;
 
-/// Bytes to be sent to a sensor, at most [`MAX_BYTES`]. 25 bytes.
+/// Bytes to be sent to a sensor, at most `MAX_BYTES`. 25 bytes.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Request {
@@ -23,7 +23,7 @@ impl Request {
         }
     }
 
-    /// These pieces one after the other; what goes beyond [`MAX_BYTES`] is left out.
+    /// These pieces one after the other; what goes beyond `MAX_BYTES` is left out.
     #[must_use]
     pub(crate) fn of(pieces: &[&[u8]]) -> Self {
         let mut request = Self::new();

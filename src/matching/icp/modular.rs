@@ -4,17 +4,17 @@
 //! what is left fits best; then again, since other pairs are closest there. The stages are those of Rusinkiewicz and Levoy
 //! (3DIM 2001). Each is a small trait with a type a choice; what is not chosen costs no flash.
 //!
-//! [`projective`](super::projective) is one fixed mixture in integers, made for the smallest boards: take it unless it lacks
+//! `projective` is one fixed mixture in integers, made for the smallest boards: take it unless it lacks
 //! something. [`Stages::projective`] is that mixture in this module's terms, and its specification:
 //! `host-tests/tests/matching/staged.rs`, `the_fused_path_is_these_stages_in_integers`, holds the two within 3 mm and 0.05°.
 //!
 //! | stage | default | choices |
 //! | --- | --- | --- |
-//! | [`selection`] | [`All`](selection::All) | every k-th, random, features, normal space |
-//! | [`correspondence`] | [`Closest`](correspondence::Closest) | brute force, compatible, normal shooting, projection |
+//! | [`selection`] | `All` | every k-th, random, features, normal space |
+//! | [`correspondence`] | `Closest` | brute force, compatible, normal shooting, projection |
 //! | [`weighting`] | [`Constant`](weighting::Constant) | distance, normals, range noise, four robust kernels, pairs of these |
 //! | [`rejection`] | [`Trimmed`](rejection::Trimmed) | distance, worst share, median, doubles, boundary, visibility, pairs |
-//! | [`minimisation`] | [`PointToLine`](minimisation::PointToLine) | point to point, Censi's constrained form |
+//! | [`minimisation`] | [`PointToLine`] | point to point, Censi's constrained form |
 
 pub mod correspondence;
 pub mod minimisation;
@@ -57,13 +57,13 @@ pub struct Stages<S, C, W, R, M> {
     pub limits: Limits,
 }
 
-/// The choices that [`projective`](super::projective) has built in: all points, projection, noise of the range seen across the
+/// The choices that `projective` has built in: all points, projection, noise of the range seen across the
 /// surface and Geman–McClure, no rejection, point to line.
 pub type Projective<const B: usize> =
     Stages<All, Projection<B>, (RangeUncertainty, GemanMcClure), Nothing, PointToLine>;
 
 impl<const B: usize> Projective<B> {
-    /// The mixture of [`projective`](super::projective) in its last passes, in `f32`: what the fast matcher computes in
+    /// The mixture of `projective` in its last passes, in `f32`: what the fast matcher computes in
     /// integers. B: directions of the reference.
     ///
     /// `host-tests/tests/matching/staged.rs` holds the two within 3 mm and 0.05° of each other.
