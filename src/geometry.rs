@@ -67,6 +67,7 @@ impl Pose {
 
     /// The pose that undoes this one: `a.inverse() * a` is the identity.
     #[must_use]
+    #[inline(never)]
     pub fn inverse(self) -> Self {
         let (s, c) = math::sin_cos(self.theta);
         Self::new(
@@ -78,6 +79,7 @@ impl Pose {
 
     /// `other` as seen from this pose: `self.inverse() * other` without the detour.
     #[must_use]
+    #[inline(never)]
     pub fn between(self, other: Self) -> Self {
         let (s, c) = math::sin_cos(self.theta);
         let (dx, dy) = (other.x - self.x, other.y - self.y);
@@ -100,6 +102,9 @@ impl Pose {
 impl Mul for Pose {
     type Output = Self;
 
+    // Once in flash, as the other steps here are: thirty copies cost a board without an FPU 2 KB, and no loop over points
+    // composes poses.
+    #[inline(never)]
     fn mul(self, other: Self) -> Self {
         let (s, c) = math::sin_cos(self.theta);
         Self::new(
@@ -162,6 +167,7 @@ impl Twist {
     ///
     /// Zero for a time that is not positive.
     #[must_use]
+    #[inline(never)]
     pub fn from_motion(motion: Pose, seconds: f32) -> Self {
         if !(seconds > 0.0) {
             return Self::ZERO;
@@ -184,6 +190,7 @@ impl Twist {
 
     /// Motion along the arc in `seconds` (the exponential map of SE(2)).
     #[must_use]
+    #[inline(never)]
     pub fn displacement(self, seconds: f32) -> Pose {
         let theta = self.omega * seconds;
         let half = 0.5 * theta;

@@ -73,6 +73,7 @@ pub fn to_mm(metres: f32) -> u16 {
 ///
 /// Meant for angles of a few turns; an angle that is not finite is returned as it is.
 #[must_use]
+#[inline(never)]
 pub fn wrap_angle(angle: f32) -> f32 {
     const TURN: f32 = 2.0 * PI;
     if (-PI..PI).contains(&angle) || !angle.is_finite() {
@@ -98,6 +99,9 @@ pub fn wrap_angle(angle: f32) -> f32 {
 /// Minimax polynomials of the Cephes library on an eighth of a turn. The error grows with `|x|` beyond 100
 /// rad, where `f32` itself no longer tells angles apart well.
 #[must_use]
+// Once in flash, as `wrap_angle` and the steps of `geometry` are: dozens of copies of 100 to 350 bytes cost more than the
+// calls, none of which is in a hot loop.
+#[inline(never)]
 pub fn sin_cos(x: f32) -> (f32, f32) {
     // π/2 in three parts, the first two with zeros at the end: k times each is exact.
     const P1: f32 = 1.570_312_5;

@@ -1,9 +1,15 @@
 //! Settings of the odometry.
 
 use crate::{
+    config::{self, ConfigError},
+    lidar::Model,
     matching::icp::IcpConfig,
     scan::{Mount, PointsConfig},
 };
+
+/// Points that a preset thins a finer lidar's scans to: at 0.35° neighbours on a wall 3 m away are 2 cm apart, which is a
+/// cheap lidar's noise, so that more of them tell little.
+const MAX_POINTS: u16 = 1024;
 
 /// Settings of [`Odometry`](super::Odometry).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,6 +59,96 @@ impl OdometryConfig {
         },
     };
 
+    /// [`OdometryConfig::DEFAULT`] for a lidar of this model: its ranges, as far as [`PointsConfig`] can hold them and from
+    /// 5 cm on; a direction for each beam of a full revolution at the usual speed. Scans of more than 1024 beams are
+    /// thinned, with fewer directions to match.
+    #[must_use]
+    pub const fn for_model(model: &Model) -> Self {
+        let default = Self::DEFAULT;
+        let near = model.min_range_mm as f32 / 1000.0;
+        let far = model.max_range_mm as f32 / 1000.0;
+        let turns = if model.revolutions_per_10s == 0 {
+            1
+        } else {
+            model.revolutions_per_10s as u32
+        };
+        let beams = (model.points_per_s * 10).div_ceil(turns);
+        let averaged = beams.div_ceil(MAX_POINTS as u32);
+        let directions = if averaged == 0 {
+            1
+        } else {
+            beams.div_ceil(averaged)
+        };
+        Self {
+            points: PointsConfig {
+                min_range: if near > default.points.min_range {
+                    near
+                } else {
+                    default.points.min_range
+                },
+                max_range: if far < default.points.max_range {
+                    far
+                } else {
+                    default.points.max_range
+                },
+                max_points: MAX_POINTS,
+                ..default.points
+            },
+            directions: directions as u16,
+            ..default
+        }
+    }
+
+    /// The same, if every setting is within its range; usable in a `const`.
+    ///
+    /// A setting out of its range does not compile:
+    ///
+    /// ```compile_fail,E0080
+    /// # use beamfix::odometry::OdometryConfig;
+    /// const CONFIG: OdometryConfig = match (OdometryConfig { keyframe_overlap: 60.0, ..OdometryConfig::DEFAULT }).checked() {
+    ///     Ok(config) => config,
+    ///     Err(_) => panic!("keyframe_overlap is a share, not per cent"),
+    /// };
+    /// # fn main() { let _ = CONFIG; }
+    /// ```
+    ///
+    /// One within it does, here for a lidar that the library knows:
+    ///
+    /// ```
+    /// # use beamfix::{lidar::Model, odometry::OdometryConfig};
+    /// const CONFIG: OdometryConfig = match OdometryConfig::for_model(&Model::LDROBOT_LD06).checked() {
+    ///     Ok(config) => config,
+    ///     Err(_) => panic!("a setting is out of its range"),
+    /// };
+    /// assert_eq!((CONFIG.directions, CONFIG.points.max_range), (450, 12.0));
+    /// ```
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first setting that is not.
+    pub const fn checked(self) -> Result<Self, ConfigError> {
+        if let Err(error) = self.points.checked() {
+            return Err(error);
+        }
+        if let Err(error) = self.icp.checked() {
+            return Err(error);
+        }
+        let (directions, needed) = (self.directions as f32, self.icp.min_inliers as f32);
+        let checks = [
+            // A keyframe of fewer lines is never matched against.
+            config::within("directions", directions, needed, 65535.0),
+            config::within("keyframe_distance", self.keyframe_distance, 0.01, 10.0),
+            config::within("keyframe_rotation", self.keyframe_rotation, 0.01, 3.15),
+            config::within("keyframe_overlap", self.keyframe_overlap, 0.0, 1.0),
+            config::within("max_correction", self.max_correction, 0.01, 10.0),
+            config::within("prior_error", self.prior_error, 0.0, 1.0),
+            config::within("max_refused", self.max_refused as f32, 1.0, 255.0),
+        ];
+        match config::all(&checks) {
+            Ok(()) => Ok(self),
+            Err(error) => Err(error),
+        }
+    }
+
     /// The same settings for a lidar that sits on the robot like this.
     #[must_use]
     pub const fn with_mount(mut self, mount: Mount) -> Self {
@@ -64,5 +160,50 @@ impl OdometryConfig {
 impl Default for OdometryConfig {
     fn default() -> Self {
         Self::DEFAULT
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_preset_of_every_lidar_is_within_its_ranges() {
+        assert_eq!(
+            OdometryConfig::DEFAULT.checked(),
+            Ok(OdometryConfig::DEFAULT)
+        );
+        for model in Model::ALL {
+            let config = OdometryConfig::for_model(model);
+            assert_eq!(config.checked(), Ok(config), "{}", model.name);
+            let most = config.points.max_points;
+            assert!(config.directions <= most, "{}: {config:?}", model.name);
+        }
+    }
+
+    #[test]
+    fn a_setting_out_of_its_range_is_named() {
+        let set: [(&str, fn(&mut OdometryConfig)); 9] = [
+            ("directions", |config| config.directions = 29),
+            ("keyframe_distance", |config| config.keyframe_distance = 0.0),
+            ("keyframe_rotation", |config| {
+                config.keyframe_rotation = 45.0
+            }),
+            ("keyframe_overlap", |config| config.keyframe_overlap = 1.01),
+            ("max_correction", |config| config.max_correction = f32::NAN),
+            ("prior_error", |config| config.prior_error = -0.1),
+            ("max_refused", |config| config.max_refused = 0),
+            ("max_range", |config| config.points.max_range = 40.0),
+            ("min_score", |config| config.icp.min_score = 25.0),
+        ];
+        for (wanted, spoil) in set {
+            let mut config = OdometryConfig::DEFAULT;
+            spoil(&mut config);
+            let refused = config.checked();
+            assert!(
+                matches!(refused, Err(ConfigError::OutOfRange { setting, .. }) if setting == wanted),
+                "{wanted}: {refused:?}"
+            );
+        }
     }
 }

@@ -12,6 +12,7 @@
 #[cfg(feature = "demo")]
 pub mod checks;
 pub mod command;
+mod config;
 #[cfg(feature = "demo")]
 pub mod demo;
 #[cfg(feature = "demo")]
@@ -20,6 +21,7 @@ pub mod link;
 #[cfg(feature = "mavlink")]
 pub mod mavlink;
 pub mod pairs;
+mod report;
 pub mod ring;
 pub mod run;
 pub mod supervisor;
@@ -28,15 +30,18 @@ pub mod text;
 
 use beamfix::{
     geometry::Pose,
-    lidar::{Packet as _, Protocol as _, ld06, motor::MotorConfig},
-    odometry::{Odometry, OdometryConfig, Step},
-    pipeline::{Pipeline, Revolution, Sink},
+    lidar::{Protocol as _, ld06},
+    odometry::Odometry,
+    pipeline::Pipeline,
 };
 use heapless::Vec;
 
 use command::Command;
+use report::Report;
 use supervisor::{Care, Seen};
-use telemetry::{Gyro, Health, Piece, Quality, Raw, Ready, Reset, Telemetry, Verdict, Wheels};
+use telemetry::{Health, Raw, Ready, Reset, Telemetry};
+
+pub use config::{AppConfig, CONFIG, Output};
 
 /// Version of [`telemetry`] and [`command`].
 pub const VERSION: u8 = 4;
@@ -44,8 +49,6 @@ pub const VERSION: u8 = 4;
 pub const LIDAR_BAUD: u32 = 230_400;
 /// What frames leave at and commands come in at: a recording with everything switched on takes half of it.
 pub const TELEMETRY_BAUD: u32 = 921_600;
-/// Revolutions between two health messages.
-const HEALTH_EVERY: u16 = 16;
 /// Bytes of the lidar that come in within this time of each other count as coming in together (µs), so that a recording
 /// can say when that was.
 const PIECE_US: u32 = 2_000;
@@ -54,79 +57,11 @@ const PIECE_US: u32 = 2_000;
 pub const BEAMS: usize = 456;
 /// The same on a board with 16 KB of RAM: the last 20 of a revolution, 16°, are given up so that the stack fits too.
 pub const SMALL_BEAMS: usize = 430;
-/// Change it here for all boards.
-pub const CONFIG: AppConfig = AppConfig::DEFAULT;
 
 /// The application as the boards run it.
 pub type Board = App<BEAMS>;
 /// The same on a board with 16 KB of RAM.
 pub type SmallBoard = App<SMALL_BEAMS>;
-
-/// Settings of [`App`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AppConfig {
-    /// How the lidar sits on the robot, what is believed and what is not.
-    pub odometry: OdometryConfig,
-    /// What is sent. Default: frames.
-    pub output: Output,
-    /// Whether the lidar's bytes, wheels and gyroscope are sent on with their times, for a replay on a PC. Default: no; a command switches it.
-    pub record: bool,
-    /// Whether every beam is sent on, for a picture on a PC. Default: no; a command switches it.
-    pub scans: bool,
-    /// Whether every pose is followed by how good its match was, in numbers. Default: no; a command switches it.
-    pub quality: bool,
-    /// How the lidar's motor is driven, where its PWM line is connected. Default: an LD06's, which listens to the line
-    /// only once it has seen a duty of 45 to 55 %, and is at its speed well within 5 s. `None` keeps the line low: an
-    /// LD06 then turns at 10 Hz by itself.
-    pub motor: Option<MotorConfig>,
-}
-
-impl AppConfig {
-    /// An LD06 at the robot's centre, frames out.
-    pub const DEFAULT: Self = Self {
-        odometry: OdometryConfig::DEFAULT,
-        output: Output::Frames,
-        record: false,
-        scans: false,
-        quality: false,
-        motor: Some(MotorConfig {
-            initial_duty: 0.5,
-            spin_up_ms: 5000,
-            ..MotorConfig::LDROBOT_LD06
-        }),
-    };
-}
-
-impl AppConfig {
-    /// For a board's features of these names: lines for a terminal in the demo, MAVLink where this crate has it.
-    #[must_use]
-    pub const fn for_features(self, demo: bool, mavlink: bool) -> Self {
-        let output = match (demo, mavlink) {
-            #[cfg(feature = "mavlink")]
-            (_, true) => Output::Mavlink,
-            (true, _) => Output::Text,
-            _ => self.output,
-        };
-        Self { output, ..self }
-    }
-}
-
-/// What is sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Output {
-    /// The frames of [`link`]: everything of [`telemetry`].
-    Frames,
-    /// Lines for a terminal: poses and health.
-    Text,
-    /// MAVLink 2: poses as `ODOMETRY`, scans as `OBSTACLE_DISTANCE`.
-    #[cfg(feature = "mavlink")]
-    Mavlink,
-}
-
-/// Most bytes that one call gives.
-///
-/// A packet makes a pose, its quality and a piece of the scan at most; health waits for room.
-const OUT: usize = if cfg!(feature = "mavlink") { 448 } else { 192 };
 
 /// What a board runs. N is the most beams a revolution may have.
 pub struct App<const N: usize> {
@@ -137,25 +72,6 @@ pub struct App<const N: usize> {
     /// Bytes of the lidar taken; wraps.
     lidar_bytes: u32,
     report: Report,
-}
-
-/// From steps to bytes to send.
-struct Report {
-    output: Output,
-    record: bool,
-    scans: bool,
-    quality: bool,
-    now_us: u32,
-    /// When the last pose was, until its error was told.
-    #[cfg(feature = "demo")]
-    pose_us: Option<u32>,
-    /// The motor's speed by the last good packet.
-    speed_deg_per_s: u16,
-    sequence: u16,
-    bytes_lost: u32,
-    care: Care,
-    health_due: bool,
-    out: Vec<u8, OUT>,
 }
 
 impl<const N: usize> App<N> {
@@ -170,21 +86,7 @@ impl<const N: usize> App<N> {
                 bytes: Vec::new(),
             },
             lidar_bytes: 0,
-            report: Report {
-                output: config.output,
-                record: config.record,
-                scans: config.scans,
-                quality: config.quality,
-                now_us: 0,
-                #[cfg(feature = "demo")]
-                pose_us: None,
-                speed_deg_per_s: 0,
-                sequence: 0,
-                health_due: false,
-                bytes_lost: 0,
-                care: Care::NONE,
-                out: Vec::new(),
-            },
+            report: Report::new(&config),
         }
     }
 
@@ -405,125 +307,5 @@ impl<const N: usize> App<N> {
             motor: self.report.care.motor,
             motor_restarts: self.report.care.motor_restarts,
         }
-    }
-}
-
-impl<const N: usize> Sink<ld06::Packet, Odometry<N>, N> for Report {
-    fn revolution(&mut self, revolution: Revolution<'_, Odometry<N>, N>) {
-        self.step(&revolution);
-    }
-
-    fn packet(&mut self, packet: &ld06::Packet) {
-        self.speed_deg_per_s = packet.speed_deg_per_s;
-        if self.scans {
-            self.send_piece(packet);
-        }
-    }
-}
-
-impl Report {
-    /// Apart, so that its memory is not on the stack during the match.
-    #[inline(never)]
-    fn step<const N: usize>(&mut self, revolution: &Revolution<'_, Odometry<N>, N>) {
-        let time_us = revolution.scan.end_us();
-        let pose = frame(self.sequence, time_us, revolution.step);
-        self.sequence = self.sequence.wrapping_add(1);
-        self.health_due |= self.sequence.is_multiple_of(HEALTH_EVERY);
-        self.send(&Telemetry::Pose(pose));
-        if self.quality {
-            self.send_quality(pose.sequence, revolution.step);
-        }
-        #[cfg(feature = "demo")]
-        {
-            self.pose_us = Some(time_us);
-        }
-        #[cfg(feature = "mavlink")]
-        if self.output == Output::Mavlink {
-            let twist = revolution.estimator.twist();
-            mavlink::append(&pose, twist, revolution.scan, self.now_us, &mut self.out);
-        }
-    }
-
-    #[inline(never)]
-    fn send_raw(&mut self, raw: &Raw) {
-        self.send(&Telemetry::Raw(raw.clone()));
-    }
-
-    /// Sends a pose of the wheels back with its time, where a recording wants it.
-    #[inline(never)]
-    fn send_wheels(&mut self, pose: [f32; 3]) {
-        if self.record {
-            let time_us = self.now_us;
-            self.send(&Telemetry::Wheels(Wheels { time_us, pose }));
-        }
-    }
-
-    /// Sends a rate of the gyroscope back with its time, where a recording wants it.
-    #[inline(never)]
-    fn send_gyro(&mut self, rate: f32) {
-        if self.record {
-            let time_us = self.now_us;
-            self.send(&Telemetry::Gyro(Gyro { time_us, rate }));
-        }
-    }
-
-    #[inline(never)]
-    fn send_quality(&mut self, sequence: u16, step: &Step) {
-        self.send(&Telemetry::Quality(Quality::of(sequence, step)));
-    }
-
-    #[inline(never)]
-    fn send_piece(&mut self, packet: &ld06::Packet) {
-        let start = packet.revolution_start();
-        self.send(&Telemetry::Scan(Piece::of(packet, start)));
-    }
-
-    #[cfg(feature = "demo")]
-    #[inline(never)]
-    fn send_truth(&mut self, truth: Pose, pose: Pose) {
-        let sequence = self.sequence.wrapping_sub(1);
-        let message = telemetry::Truth {
-            sequence,
-            pose: [truth.x, truth.y, truth.theta],
-        };
-        self.send(&Telemetry::Truth(message));
-        if self.output == Output::Text {
-            let off = truth.between(pose);
-            text::append_error(
-                1000.0 * off.distance(),
-                off.theta.to_degrees(),
-                &mut self.out,
-            );
-        }
-    }
-
-    /// A frame that finds no room is dropped: its sequence number will be missing.
-    fn send(&mut self, message: &Telemetry) {
-        match self.output {
-            Output::Frames => {
-                let _ = link::append(message, &mut self.out);
-            }
-            Output::Text => text::append(message, &mut self.out),
-            #[cfg(feature = "mavlink")]
-            Output::Mavlink => mavlink::append_heartbeat(message, &mut self.out),
-        }
-    }
-}
-
-/// A step as it is sent.
-fn frame(sequence: u16, time_us: u32, step: &Step) -> telemetry::Pose {
-    let (inliers, beams, residual) = match &step.outcome {
-        Ok(found) => (found.inliers, found.beams, found.residual),
-        Err(_) => (0, 0, 0.0),
-    };
-    telemetry::Pose {
-        sequence,
-        time_us,
-        pose: [step.pose.x, step.pose.y, step.pose.theta],
-        covariance: step.covariance.to_array(),
-        verdict: Verdict::of(step),
-        inliers,
-        beams,
-        residual,
     }
 }
