@@ -166,7 +166,12 @@ impl<const N: usize> Scan<N> {
         let alone = self.end_us.wrapping_sub(self.before_us) > LONG;
         let ahead = self.end_us.wrapping_sub(time_us);
         if alone && ahead > LONG && ahead < 1 << 31 && self.beams.len() > 1 {
-            self.beams.remove(usize::from(self.latest));
+            // Those after it move up; `Vec::remove` could panic.
+            let mut next = self.beams.pop();
+            let after = self.beams.get_mut(usize::from(self.latest)..);
+            for beam in after.into_iter().flatten().rev() {
+                next = next.map(|next| core::mem::replace(beam, next));
+            }
             self.end_us = self.before_us;
             self.outliers = self.outliers.wrapping_add(1);
             // Which of the others is the latest matters only until a later one comes.
