@@ -7,29 +7,18 @@
 mod attempt;
 mod config;
 mod deskew;
-mod error_model;
-mod fusion;
 mod keyframes;
 mod motion;
 mod prior;
 mod state;
 mod step;
-mod tracking;
 
 pub use config::OdometryConfig;
 pub use state::Odometry;
 pub use step::{Counters, Refusal, Step};
 
-use crate::{
-    geometry::{EgoMotion, Twist},
-    linalg::Covariance,
-    matching::MatchError,
-    math,
-    scan::Scan,
-};
+use crate::{geometry::EgoMotion, math, scan::Scan};
 use attempt::Attempt;
-use motion::Times;
-use prior::Prior;
 
 impl<const N: usize> Odometry<N> {
     /// Takes a scan in and says where the robot is.
@@ -47,8 +36,8 @@ impl<const N: usize> Odometry<N> {
         self.deskewed.assign(scan, prior.twist, &self.config.points);
         let mut step = Step {
             pose: prior.pose,
-            covariance: self.covariance,
-            outcome: self.try_match(prior.pose, &prior.relative),
+            covariance: prior.covariance,
+            outcome: self.try_match(prior.pose),
             keyframe: false,
         };
         let mut best = Attempt {
@@ -59,22 +48,20 @@ impl<const N: usize> Odometry<N> {
             self.retry_fallback(&prior, times, &mut best);
         }
         if best.is_unsure() && self.may_retry_turn_rates(&prior, times) {
-            self.retry_turn_rates(scan, times, &prior, &mut best);
+            self.retry_turn_rates(scan, times, &mut best);
         }
-        self.refuse_contradicting(&prior, times, &mut best);
-        self.refuse_ambiguous(&prior, &mut best);
 
         self.deskewed.pose = prior.pose;
         match &mut *best.outcome {
             Ok(found) => {
-                (self.pose, self.covariance) =
-                    self.refine(scan, (found, best.twist), &prior, times);
+                let refined = self.refine(scan, (found, best.twist), &prior, times);
+                (step.pose, step.covariance) = refined;
             }
-            Err(refusal) => {
-                let covered = matches!(refusal, Refusal::NoMatch(MatchError::TooFewBeams { .. }));
-                self.coast(&prior, best.twist, times, covered);
-            }
+            Err(_) => self
+                .motion
+                .advance(prior.pose, best.twist, prior.wheel_twist, times),
         }
+        (self.pose, self.covariance) = (step.pose, step.covariance);
 
         let acceleration = math::abs(self.motion.twist.omega - last.omega) * times.duration;
         step.keyframe = self.is_keyframe(&step.outcome, acceleration);
@@ -83,28 +70,6 @@ impl<const N: usize> Odometry<N> {
         }
         self.note_outcome(&step.outcome, step.keyframe);
         self.end_us = scan.end_us();
-        step.pose = self.pose;
-        // What the robot has done since the middle of the scan is only predicted.
-        step.covariance = self
-            .covariance
-            .plus(&error_model::unforeseen(times.duration))
-            .plus(&Covariance(prior.growth.0.scaled(0.25)));
         step
-    }
-
-    /// Takes the prior as the pose: the scan has no match.
-    #[inline(never)]
-    fn coast(&mut self, prior: &Prior, twist: Twist, times: Times, covered: bool) {
-        self.motion
-            .advance(prior.pose, twist, prior.wheel_twist, times);
-        self.wheel_errors.interrupt();
-        let tracking = &mut self.tracking;
-        tracking.relative = prior.relative;
-        tracking.blind += times.elapsed;
-        tracking.covered |= covered;
-        self.pose = prior.pose;
-        self.covariance = self
-            .keyframe
-            .covariance_at(prior.pose, &self.tracking.covariance());
     }
 }

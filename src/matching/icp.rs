@@ -25,7 +25,6 @@ pub(crate) mod projective;
 #[cfg(feature = "internals")]
 pub mod projective;
 
-pub(crate) use projective::remove_companions;
 pub use projective::{IcpConfig, Reference, Search, align};
 #[cfg(not(feature = "internals"))]
 pub(crate) use projective::{Line, align_observed, smooth_towards};

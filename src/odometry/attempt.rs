@@ -1,16 +1,15 @@
 //! Matching a scan: at the prior, and where that fails at other poses and other turn rates.
 
 use super::{
-    fusion::MAX_DIFFERENCE,
-    motion::{Source, Times},
-    prior::Prior,
+    motion::Times,
+    prior::{Prior, farther},
     state::Odometry,
     step::Refusal,
 };
 use crate::{
     geometry::{Pose, Twist},
-    linalg::{Covariance, Sym3},
-    matching::{Match, MatchError, icp},
+    linalg::Covariance,
+    matching::{Match, icp},
     math,
     scan::Scan,
 };
@@ -40,8 +39,8 @@ fn score(outcome: &Result<Match, Refusal>) -> f32 {
 impl<const N: usize> Odometry<N> {
     /// Matches the scan, deskewed with `twist`, at another pose, and takes that match if it explains the scan better.
     #[inline]
-    fn improve(&self, best: &mut Attempt, twist: Twist, predicted: Pose, prior: &Prior) {
-        let outcome = self.try_match(predicted, &prior.relative);
+    fn improve(&self, best: &mut Attempt, twist: Twist, predicted: Pose) {
+        let outcome = self.try_match(predicted);
         if score(&outcome) > score(best.outcome) {
             *best.outcome = outcome;
             best.twist = twist;
@@ -53,7 +52,7 @@ impl<const N: usize> Odometry<N> {
     #[inline(never)]
     pub(super) fn retry_fallback(&self, prior: &Prior, times: Times, best: &mut Attempt) {
         if let Some(guess) = self.fallback_prior(prior, times) {
-            self.improve(best, best.twist, guess, prior);
+            self.improve(best, best.twist, guess);
         }
     }
 
@@ -62,13 +61,7 @@ impl<const N: usize> Odometry<N> {
     ///
     /// Without wheels and gyroscope nothing foretells a sudden rotation, and a scan that it skewed fits nowhere.
     #[inline(never)]
-    pub(super) fn retry_turn_rates(
-        &mut self,
-        scan: &Scan<N>,
-        times: Times,
-        prior: &Prior,
-        best: &mut Attempt,
-    ) {
+    pub(super) fn retry_turn_rates(&mut self, scan: &Scan<N>, times: Times, best: &mut Attempt) {
         /// Change of the turn rate that a step tries (rad/s²); two steps are a nimble robot's.
         const STEP: f32 = 4.0;
         let expected = best.twist;
@@ -78,12 +71,7 @@ impl<const N: usize> Odometry<N> {
                 ..expected
             };
             self.deskewed.assign(scan, twist, &self.config.points);
-            self.improve(
-                best,
-                twist,
-                self.pose * twist.displacement(times.seconds),
-                prior,
-            );
+            self.improve(best, twist, self.pose * twist.displacement(times.seconds));
             if !best.is_unsure() {
                 break;
             }
@@ -104,7 +92,7 @@ impl<const N: usize> Odometry<N> {
         times: Times,
     ) -> (Pose, Covariance) {
         let back = -0.5 * times.duration;
-        let (end, mut of_match) = self.robot_pose(found);
+        let (end, mut covariance) = self.robot_pose(found);
         self.deskewed.pose = end;
         let mut middle = end * expected.displacement(back);
         let retried = prior.wheel_twist.is_none() && expected != prior.twist;
@@ -126,88 +114,21 @@ impl<const N: usize> Odometry<N> {
         ) {
             self.deskewed.assign(scan, during, &self.config.points);
             self.deskewed.pose = middle * during.displacement(-back);
-            if let Ok(again) = self.try_match(self.deskewed.pose, &prior.relative) {
+            if let Ok(again) = self.try_match(self.deskewed.pose) {
                 *found = again;
-                (self.deskewed.pose, of_match) = self.robot_pose(found);
+                (self.deskewed.pose, covariance) = self.robot_pose(found);
                 middle = self.deskewed.pose * during.displacement(back);
             }
         }
-        let unskewed = self.motion.unskewed(during, prior.source, times);
-        let matched = middle * during.displacement(-back) * unskewed;
-        let pose = self.fuse(matched, &of_match, found, prior);
-        // The points are seen from where fusion has moved the robot to.
-        self.deskewed.pose = pose * matched.between(self.deskewed.pose);
-        self.learn(matched, &of_match, prior, found);
-        // What an acceleration during the scan skews is undone to first order, and may be off by as much.
-        let change = during.minus(self.motion.twist);
-        let along = 0.25 * times.duration * change.speed();
-        let skew = Sym3::diagonal(
-            along * along,
-            along * along,
-            unskewed.theta * unskewed.theta,
-        );
-        let end = pose * unskewed.inverse();
-        self.motion.advance(end, during, prior.wheel_twist, times);
-        let told = Covariance(self.tracking.covariance().0.plus(&skew));
-        (pose, self.keyframe.covariance_at(pose, &told))
-    }
-
-    /// Refuses a match that fits as well with another heading, where the prior does not tell which of them it is: after a
-    /// gap without wheels, in a room that looks the same from several sides.
-    #[inline(never)]
-    pub(super) fn refuse_ambiguous(&self, prior: &Prior, best: &mut Attempt) {
-        /// A heading known better than this (rad) decides between two sides of a hexagon.
-        const SURE: f32 = 0.3;
-        /// Headings that are tried, and how far apart two of them are (rad).
-        const SIDES: u8 = 8;
-        const APART: f32 = 0.3;
-        /// A match elsewhere that explains this share of what the best does is as good.
-        const AS_GOOD: f32 = 0.85;
-        let sigma = math::sqrt(prior.relative.0.tt);
-        let Ok(found) = &*best.outcome else {
-            return;
-        };
-        if sigma < SURE {
-            return;
-        }
-        let points = self.deskewed.points.as_slice();
-        // About the middle of what is seen.
-        let sum = points.iter().fold((0, 0), |(x, y), point| {
-            (x + i32::from(point.x), y + i32::from(point.y))
-        });
-        let scale = 1e-3 / points.len() as f32;
-        let middle = Pose::new(sum.0 as f32 * scale, sum.1 as f32 * scale, 0.0);
-        for side in 1..SIDES {
-            let rotation = f32::from(side) * core::f32::consts::TAU / f32::from(SIDES);
-            let turned = middle * Pose::new(0.0, 0.0, rotation) * middle.inverse();
-            let guess = found.pose * turned;
-            let other = icp::align(&self.keyframe.reference, points, guess, &self.config.icp);
-            if let Ok(other) = other
-                && other.score > AS_GOOD * found.score
-                && math::abs(math::wrap_angle(other.pose.theta - found.pose.theta)) > APART
-            {
-                let ratio = other.score / found.score;
-                *best.outcome = Err(Refusal::NoMatch(MatchError::Ambiguous { ratio }));
-                return;
-            }
-        }
+        let pose = middle * during.displacement(-back);
+        self.motion.advance(pose, during, prior.wheel_twist, times);
+        (pose, covariance)
     }
 
     /// Matches the points against the keyframe, starting from where the robot should be.
-    pub(super) fn try_match(
-        &self,
-        predicted: Pose,
-        expected: &Covariance,
-    ) -> Result<Match, Refusal> {
-        let needed = 2 * self.config.icp.min_inliers;
-        let points = self.deskewed.points.as_slice();
-        if self.counters.keyframes == 0 {
-            let found = points.len() as u16;
-            return Err(if found < needed {
-                Refusal::NoMatch(MatchError::TooFewBeams { found, needed })
-            } else {
-                Refusal::First
-            });
+    pub(super) fn try_match(&self, predicted: Pose) -> Result<Match, Refusal> {
+        if self.keyframe.reference.is_empty() {
+            return Err(Refusal::First);
         }
         let motion = self.keyframe.pose.between(predicted);
         let guess = self.config.points.mount.lidar_motion(motion);
@@ -219,67 +140,15 @@ impl<const N: usize> Odometry<N> {
         )
         .map_err(Refusal::NoMatch);
         if let Ok(found) = &outcome {
-            // A guess that may be far off is corrected by as much.
-            let off = guess.between(found.pose);
-            let (distance, rotation) = (off.distance(), math::abs(off.theta));
             let limit = self.config.max_correction * found.score;
-            let p = &expected.0;
-            let (far, turned) = (
-                limit + 2.0 * math::sqrt(p.xx + p.yy),
-                2.0 * limit + 2.0 * math::sqrt(p.tt),
-            );
-            if distance > far || rotation > turned {
+            if let Some((distance, rotation)) = farther(guess, found.pose, limit) {
                 outcome = Err(Refusal::TooFar { distance, rotation });
             }
         }
         outcome
     }
 
-    /// Refuses a match that contradicts the wheels, where it is not sure by itself: it explains little of the scan, and the
-    /// wheels were right up to now; or the lidar was covered, and the robot may have been carried elsewhere.
-    #[inline(never)]
-    pub(super) fn refuse_contradicting(&self, prior: &Prior, times: Times, best: &mut Attempt) {
-        let Ok(found) = &*best.outcome else {
-            return;
-        };
-        /// So many scans in a row may be refused for it: then the wheels are wrong, and the scans agree.
-        const MAX_DOUBTED: u8 = 2;
-        let doubtful = best.is_unsure()
-            && self.refused_in_a_row < MAX_DOUBTED
-            && self.wheel_errors.were_right();
-        if prior.source != Source::Wheels || !(doubtful || self.tracking.covered) {
-            return;
-        }
-        let (measured, of_match) = self.robot_pose(found);
-        let contradicts =
-            |pose: Pose| normalised(&prior.relative, &of_match, pose, measured) > MAX_DIFFERENCE;
-        // The wheels may be wrong, but not what the robot did up to now as well.
-        let coasting = self.pose * self.motion.twist.displacement(times.seconds);
-        if contradicts(prior.pose) && contradicts(coasting) {
-            let off = prior.pose.between(measured);
-            *best.outcome = Err(Refusal::TooFar {
-                distance: off.distance(),
-                rotation: math::abs(off.theta),
-            });
-        }
-    }
-
-    /// Learns from a match how good the wheels are.
-    fn learn(&mut self, matched: Pose, of_match: &Covariance, prior: &Prior, found: &Match) {
-        let sure = found.degenerate_direction.is_none() && !self.tracking.is_doubted();
-        if prior.source == Source::Wheels && sure {
-            let off = self.tracking.wheels.between(matched);
-            self.wheel_errors
-                .learn(off, self.config.prior_error, prior.motion, of_match);
-        } else {
-            self.wheel_errors.interrupt();
-        }
-        if found.degenerate_direction.is_none() {
-            self.tracking.coasting = 0.0;
-        }
-    }
-
-    /// Robot pose of a match, with its covariance relative to the keyframe.
+    /// Robot pose of a match, with its covariance.
     fn robot_pose(&self, found: &Match) -> (Pose, Covariance) {
         let mount = &self.config.points.mount;
         let pose = self.keyframe.pose * mount.robot_motion(found.pose);
@@ -290,19 +159,8 @@ impl<const N: usize> Odometry<N> {
             .covariance
             .rotated(lidar_frame)
             .transported(pose.x - start_from_lidar.x, pose.y - start_from_lidar.y);
-        (pose, of_match)
+        (pose, self.keyframe.covariance_at(pose, &of_match))
     }
-}
-
-/// Squared distance of two poses, normalised by the covariances of both.
-fn normalised(a: &Covariance, b: &Covariance, from: Pose, to: Pose) -> f32 {
-    let off = [
-        to.x - from.x,
-        to.y - from.y,
-        math::wrap_angle(to.theta - from.theta),
-    ];
-    let information = a.0.plus(&b.0).inverse();
-    information.map_or(f32::INFINITY, |information| information.quadratic(off))
 }
 
 /// Whether two motions skew a scan differently: by more than 1 cm or 0.3°.

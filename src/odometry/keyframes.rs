@@ -1,13 +1,7 @@
 //! When a scan becomes the keyframe, and what is counted.
 
-use super::{
-    error_model::{ANY_HEADING, WALKING},
-    state::Odometry,
-    step::Refusal,
-    tracking::Tracking,
-};
+use super::{state::Odometry, step::Refusal};
 use crate::{
-    linalg::{Covariance, Sym3},
     matching::{Match, icp},
     math,
 };
@@ -68,38 +62,16 @@ impl<const N: usize> Odometry<N> {
     #[inline(never)]
     pub(super) fn keep(&mut self, outcome: &Result<Match, Refusal>) {
         let (keyframe, scan) = (&mut self.keyframe, &mut self.deskewed);
-        let motion = keyframe.pose.between(scan.pose);
-        let pose = self.config.points.mount.lidar_motion(motion);
-        if outcome.is_ok() {
-            icp::remove_companions(&keyframe.reference, &mut scan.points, pose);
-        }
         if outcome
             .as_ref()
             .is_ok_and(|found| found.degenerate_direction.is_none())
         {
+            let motion = keyframe.pose.between(scan.pose);
+            let pose = self.config.points.mount.lidar_motion(motion);
             icp::smooth_towards(&keyframe.reference, scan.points.as_mut_slice(), pose);
         }
         keyframe.reference.assign(scan.points.as_slice());
         keyframe.pose = scan.pose;
-        if matches!(outcome, Err(Refusal::NoMatch(_) | Refusal::TooFar { .. })) {
-            self.covariance = self.covariance_when_lost();
-        }
-        self.keyframe.covariance = self.covariance;
-        self.tracking = Tracking::at(self.pose, self.tracking.coasting);
-        self.wheel_errors.interrupt();
-    }
-
-    /// Covariance of the pose once the keyframe is given up: near it scans should have matched, and the robot may have
-    /// been carried anywhere since the last match, and turned.
-    fn covariance_when_lost(&self) -> Covariance {
-        /// From farther than this a keyframe is no longer in sight (m).
-        const IN_SIGHT: f32 = 1.0;
-        if self.keyframe.pose.between(self.pose).distance() > IN_SIGHT {
-            return self.covariance;
-        }
-        let carried = 2.0 * WALKING * self.tracking.blind;
-        let (distance, rotation) = (carried * carried, ANY_HEADING * ANY_HEADING);
-        self.covariance
-            .plus(&Covariance(Sym3::diagonal(distance, distance, rotation)))
+        keyframe.covariance = self.covariance;
     }
 }

@@ -16,17 +16,6 @@ pub(super) struct Times {
     pub seconds: f32,
     /// Time from the scan's first beam to its last (s).
     pub duration: f32,
-    /// Time from the last scan's end to this one's as far as is known, also over a gap (s).
-    pub elapsed: f32,
-}
-
-/// Where a prior comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Source {
-    /// The wheels' motion since the last scan.
-    Wheels,
-    /// The last velocity, which is believed to go on.
-    Velocity,
 }
 
 /// Motion up to the last scan.
@@ -38,8 +27,6 @@ pub(super) struct Motion {
     middle: Pose,
     /// Velocity during the last scan by the wheels; zero without them.
     wheel_twist: Twist,
-    /// Motion that the wheels said last, believed or not.
-    pub said: Pose,
     /// Time from the last scan's first beam to its last (s).
     duration: f32,
     /// Running mean of the time from scan to scan (s).
@@ -52,31 +39,9 @@ impl Motion {
         twist: Twist::ZERO,
         middle: Pose::IDENTITY,
         wheel_twist: Twist::ZERO,
-        said: Pose::IDENTITY,
         duration: 0.0,
         mean_interval: 0.0,
     };
-
-    /// Whether wheels that say `motion` have jumped: it differs by more than any robot accelerates from where the robot
-    /// would be by the velocity that it was found to have, and from the motion that they said before.
-    pub fn is_jump(&self, motion: Pose, coasting: Twist, times: Times) -> bool {
-        /// Hardest braking and turning of a robot (m/s², rad/s²) ...
-        const HARDEST: (f32, f32) = (10.0, 20.0);
-        /// ... and how far off a motion between two scans may be measured besides (m, rad).
-        const NOISE: (f32, f32) = (0.1, 0.15);
-        if times.seconds <= 0.0 {
-            return false;
-        }
-        // Where the clock's moments jump, more time may have passed than it says.
-        let seconds = math::max(times.seconds, self.mean_interval);
-        let square = seconds * seconds;
-        let far = |expected: Pose| {
-            let off = expected.between(motion);
-            off.distance() > HARDEST.0 * square + NOISE.0
-                || math::abs(off.theta) > HARDEST.1 * square + NOISE.1
-        };
-        far(coasting.displacement(times.seconds)) && far(self.said)
-    }
 
     /// Velocity during a scan whose middle was found at `middle`: wheel velocity plus the correction that the last two
     /// matches imply. Without wheels the whole velocity comes from the matches.
@@ -110,25 +75,6 @@ impl Motion {
         }
     }
 
-    /// Rotation that a change of the turn rate adds between what a match of a scan deskewed with `during` says of its end
-    /// and its real end: a constant acceleration since the last scan.
-    ///
-    /// Wheels tell the mean rate over the scan, and its middle lags by a twelfth of what the rate has changed by. Without
-    /// them the rate is that from the last scan's middle to this one's: it lags by half a scan, as long as it changes.
-    pub fn unskewed(&self, during: Twist, source: Source, times: Times) -> Pose {
-        /// Less is the noise of two matches (rad).
-        const NOISE: f32 = 0.015;
-        let change = (during.omega - self.twist.omega) * times.duration;
-        if math::abs(change) < NOISE {
-            return Pose::IDENTITY;
-        }
-        let share = match source {
-            Source::Wheels => 1.0 / 12.0,
-            Source::Velocity => 0.25,
-        };
-        Pose::new(0.0, 0.0, share * change)
-    }
-
     /// Takes a scan that ended at `end` and during which the robot moved with `twist`.
     pub fn advance(&mut self, end: Pose, twist: Twist, wheels: Option<Twist>, times: Times) {
         self.middle = end * twist.displacement(-0.5 * times.duration);
@@ -146,7 +92,6 @@ mod tests {
     const TIMES: Times = Times {
         seconds: 0.1,
         duration: 0.1,
-        elapsed: 0.1,
     };
 
     fn driving(vx: f32, omega: f32) -> Twist {
@@ -198,7 +143,6 @@ mod tests {
             let times = Times {
                 seconds,
                 duration: 0.0,
-                elapsed: seconds,
             };
             end = end * step;
             let during = motion.during(end, None, times);

@@ -1,13 +1,9 @@
 //! Where the robot should be before its scan is looked at.
 
-use super::{
-    error_model,
-    motion::{Source, Times},
-    state::Odometry,
-};
+use super::{motion::Times, state::Odometry};
 use crate::{
     geometry::{EgoMotion, Pose, Twist},
-    linalg::Covariance,
+    linalg::{Covariance, Sym3},
     math,
     scan::Scan,
 };
@@ -18,14 +14,8 @@ pub(super) struct Prior {
     pub twist: Twist,
     /// Robot at the scan's end.
     pub pose: Pose,
-    /// Covariance of `pose` relative to the keyframe.
-    pub relative: Covariance,
-    /// Covariance of `motion`, in the same frame.
-    pub growth: Covariance,
-    /// Where `pose` comes from.
-    pub source: Source,
-    /// Motion of the robot since the last scan.
-    pub motion: Pose,
+    /// Covariance of `pose`.
+    pub covariance: Covariance,
     /// Velocity by the wheels, where there are any.
     pub wheel_twist: Option<Twist>,
     /// Rate of turn by the gyroscope (rad/s), where there is one.
@@ -36,25 +26,12 @@ impl<const N: usize> Odometry<N> {
     /// Times of a scan; all 0 for the first one and for clocks that stand still or jump.
     pub(super) fn times(&self, scan: &Scan<N>) -> Times {
         let micros = scan.end_us().wrapping_sub(self.end_us);
-        if self.counters.scans == 0 {
+        if self.counters.scans == 0 || micros > 2_000_000 {
             return Times::default();
         }
-        // A clock that went back tells nothing; a second may have passed.
-        let elapsed = if micros > 1 << 31 {
-            1.0
-        } else {
-            micros as f32 * 1e-6
-        };
-        if micros > 2_000_000 {
-            return Times {
-                elapsed,
-                ..Times::default()
-            };
-        }
         Times {
-            seconds: elapsed,
+            seconds: micros as f32 * 1e-6,
             duration: if micros > 0 { scan.duration() } else { 0.0 },
-            elapsed,
         }
     }
 
@@ -69,7 +46,7 @@ impl<const N: usize> Odometry<N> {
     /// Pose and velocity that the wheels tell; without them the last velocity goes on, turned by the gyroscope.
     /// Apart, as the other steps are: so that their memory is not on the stack during a match.
     #[inline(never)]
-    pub(super) fn predict(&mut self, ego: EgoMotion, times: Times) -> Prior {
+    pub(super) fn predict(&self, ego: EgoMotion, times: Times) -> Prior {
         let wheels = wheel_motion(ego);
         let wheel_twist = wheels.map(|motion| Twist::from_motion(motion, times.seconds));
         let turn_rate = ego
@@ -77,55 +54,38 @@ impl<const N: usize> Odometry<N> {
             .filter(|rotation| rotation.is_finite() && times.seconds > 0.0)
             .map(|rotation| rotation / times.seconds);
         let last = self.motion.twist;
-        let coasting = Twist {
+        let twist = wheel_twist.unwrap_or(Twist {
             omega: turn_rate.unwrap_or(last.omega),
             ..last
-        };
-        let jumped = wheels.is_some_and(|motion| self.motion.is_jump(motion, coasting, times));
-        if jumped {
-            self.counters.wheel_jumps = self.counters.wheel_jumps.wrapping_add(1);
-        }
-        self.motion.said = wheels.unwrap_or(coasting.displacement(times.seconds));
-        let (wheels, wheel_twist) = if jumped {
-            (None, None)
-        } else {
-            (wheels, wheel_twist)
-        };
-        let twist = wheel_twist.unwrap_or(coasting);
+        });
         let motion = match wheels {
             // Without a clock there is no velocity, but the wheels still tell how far.
             Some(motion) if times.seconds == 0.0 => motion,
             _ => twist.displacement(times.seconds),
         };
-        let pose = self.pose * motion;
-        let (dx, dy) = (pose.x - self.pose.x, pose.y - self.pose.y);
-        let tracking = &mut self.tracking;
-        tracking.seconds += times.elapsed;
-        let before = tracking.coasting;
-        tracking.coasting += times.elapsed;
-        let (source, growth) = if wheels.is_some() {
-            tracking.coasting = 0.0;
-            let share = self.config.prior_error;
-            (Source::Wheels, self.wheel_errors.covariance(share, motion))
-        } else {
-            let mut growth = error_model::coasting_between(before, tracking.coasting);
-            growth.0 = growth.0.plus(&error_model::FLOOR);
-            if turn_rate.is_some() {
-                growth.0.tt = self.wheel_errors.covariance(0.02, motion).0.tt;
-            }
-            (Source::Velocity, growth)
-        };
-        tracking.wheels = tracking.wheels * motion;
         Prior {
             twist,
-            pose,
-            relative: Covariance(tracking.relative.transported(dx, dy).0.plus(&growth.0)),
-            growth,
-            source,
-            motion,
+            pose: self.pose * motion,
+            covariance: self.predict_covariance(motion),
             wheel_twist,
             turn_rate,
         }
+    }
+
+    /// Covariance of the pose after a predicted motion.
+    fn predict_covariance(&self, motion: Pose) -> Covariance {
+        /// Error of a predicted standstill (m, rad).
+        const MIN_ERROR: f32 = 0.002;
+        let along = self.config.prior_error * motion.distance() + MIN_ERROR;
+        let rotation = self.config.prior_error * math::abs(motion.theta) + MIN_ERROR;
+        let moved = self.pose * motion;
+        self.covariance
+            .transported(moved.x - self.pose.x, moved.y - self.pose.y)
+            .plus(&Covariance(Sym3::diagonal(
+                along * along,
+                along * along,
+                rotation * rotation,
+            )))
     }
 
     /// A second guess of the robot's pose, for a scan that does not fit at the predicted one.
@@ -137,9 +97,7 @@ impl<const N: usize> Odometry<N> {
         }
         // Wheels that slip tell a wrong motion; but a clock whose moments jump tells a wild velocity.
         let coasting = self.pose * self.motion.twist.displacement(times.seconds);
-        let off = prior.pose.between(coasting);
-        let limit = self.config.max_correction;
-        let wild = off.distance() > limit || math::abs(off.theta) > 2.0 * limit;
+        let wild = farther(prior.pose, coasting, self.config.max_correction).is_some();
         (!wild).then_some(coasting)
     }
 }
@@ -150,4 +108,11 @@ fn wheel_motion(ego: EgoMotion) -> Option<Pose> {
     const FARTHEST: f32 = 32.0;
     ego.motion()
         .filter(|motion| motion.is_finite() && motion.distance() < FARTHEST)
+}
+
+/// How far apart two poses are (m, rad), if by more than `limit` metres or twice as many radians.
+pub(super) fn farther(a: Pose, b: Pose, limit: f32) -> Option<(f32, f32)> {
+    let off = a.between(b);
+    let (distance, rotation) = (off.distance(), math::abs(off.theta));
+    (distance > limit || rotation > 2.0 * limit).then_some((distance, rotation))
 }

@@ -188,8 +188,6 @@ fn replay<const N: usize>(
         refused,
         keyframes,
         lost,
-        wheel_jumps,
-        contradicted,
     } = followed.estimator.counters();
     let value = json!({
         "lidar": args.lidar, "seed": args.seed,
@@ -197,7 +195,7 @@ fn replay<const N: usize>(
         "max_error_m": errors.largest.0, "max_error_deg": errors.largest.1,
         "wheels_error_m": errors.wheels.0, "wheels_error_deg": errors.wheels.1,
         "distance_m": drive.distance, "seconds": seconds, "scans": scans,
-        "refused": refused, "keyframes": keyframes, "lost": lost, "wheel_jumps": wheel_jumps, "contradicted": contradicted, "refused_beams": followed.refused_beams,
+        "refused": refused, "keyframes": keyframes, "lost": lost, "refused_beams": followed.refused_beams,
         "bytes": drive.bytes.len(), "packets": summary.packets, "pose_hash": followed.hash.to_string(),
     });
     let text = format!(

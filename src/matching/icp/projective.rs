@@ -20,7 +20,6 @@
 //! What a pose is worth is judged apart from how it was found (`score`), so that several starts can compete.
 
 mod accumulate;
-mod companions;
 mod line;
 mod multistart;
 mod normals;
@@ -29,7 +28,6 @@ mod score;
 mod smoothing;
 mod verdict;
 
-pub(crate) use companions::remove_companions;
 pub use line::Line;
 pub use reference::Reference;
 

@@ -20,17 +20,13 @@ pub fn run(args: &Args, log: &Log, (size, directions): (usize, usize)) -> Result
     let outcome = sized!(size, replay(args, log, directions))?;
     let (counters, measured) = outcome.estimator;
     let Counters {
-        keyframes,
-        lost,
-        wheel_jumps,
-        contradicted,
-        ..
+        keyframes, lost, ..
     } = counters;
     let scans = outcome.scans;
     // A scan before the first reference has no pose of its own either.
     let refused = scans - measured;
     let mut value = json!({
-        "scans": scans, "refused": refused, "keyframes": keyframes, "lost": lost, "wheel_jumps": wheel_jumps, "contradicted": contradicted, "loops": 0,
+        "scans": scans, "refused": refused, "keyframes": keyframes, "lost": lost, "loops": 0,
         "beams": size, "refused_beams": outcome.refused_beams, "pose_hash": outcome.hash.to_string(),
     });
     add_context(&mut value, args, log, outcome.last);
