@@ -159,7 +159,7 @@ impl Shape {
 
     /// Where a point of the map lies on the grid, in cells: (0.5, 0.5) is the middle of the first cell.
     #[must_use]
-    pub(crate) fn to_cells(&self, point_in_map: Point) -> Point {
+    pub(crate) fn cells_at(&self, point_in_map: Point) -> Point {
         let point = self.origin.inverse() * point_in_map;
         Point::new(point.x / self.resolution, point.y / self.resolution)
     }
@@ -167,7 +167,7 @@ impl Shape {
     /// The cell that a point of the map lies in, on the grid or off it.
     #[must_use]
     pub fn cell_of(&self, point_in_map: Point) -> (i32, i32) {
-        let cells = self.to_cells(point_in_map);
+        let cells = self.cells_at(point_in_map);
         (floor(cells.x), floor(cells.y))
     }
 

@@ -51,6 +51,9 @@ impl<E> Followed<E> {
     }
 }
 
+/// Gets each scan, the pose after it (the last one again where there is none), and what the estimator says.
+pub type Sink<'a, S> = dyn FnMut(&Recorded, Pose, &S) -> Result<()> + 'a;
+
 /// Runs the first `scans` scans of a log through `estimator`: a capture's bytes as a board gets them, else scan by scan.
 ///
 /// `sink` gets each scan, the pose (the last one again where there is none), and what the estimator says. Without
@@ -59,7 +62,7 @@ pub fn follow<E: Estimator<N>, const N: usize>(
     log: &Log,
     (scans, ego): (usize, bool),
     estimator: E,
-    sink: &mut dyn FnMut(&Recorded, Pose, &E::Step) -> Result<()>,
+    sink: &mut Sink<'_, E::Step>,
 ) -> Result<Followed<E>> {
     let mut following = Following {
         log,
@@ -95,7 +98,7 @@ struct Following<'a, E: Estimator<N>, const N: usize> {
     log: &'a Log,
     scans: usize,
     ego: bool,
-    sink: &'a mut dyn FnMut(&Recorded, Pose, &E::Step) -> Result<()>,
+    sink: &'a mut Sink<'a, E::Step>,
     number: usize,
     hash: PoseHash,
     last: Pose,

@@ -50,7 +50,7 @@ impl Ray {
     /// From `map_from_lidar` in the direction `bearing`; `None` where the lidar is off the grid.
     #[must_use]
     pub fn new(shape: &Shape, map_from_lidar: Pose, bearing: Bearing) -> Option<Self> {
-        let start = shape.to_cells(Point::new(map_from_lidar.x, map_from_lidar.y));
+        let start = shape.cells_at(Point::new(map_from_lidar.x, map_from_lidar.y));
         let (x, y) = (super::floor(start.x), super::floor(start.y));
         shape.index(x, y)?;
         let heading = Bearing::from_radians(map_from_lidar.theta - shape.origin().theta);

@@ -183,7 +183,8 @@ mod tests {
 
     #[test]
     fn a_setting_out_of_its_range_is_named() {
-        let set: [(&str, fn(&mut OdometryConfig)); 9] = [
+        type Set = fn(&mut OdometryConfig);
+        let set: [(&str, Set); 9] = [
             ("directions", |config| config.directions = 29),
             ("keyframe_distance", |config| config.keyframe_distance = 0.0),
             ("keyframe_rotation", |config| {

@@ -46,7 +46,7 @@ impl Gyro {
         let (since, next) = match after(self.message_us, end_us) {
             0..=MAX_GAP_US => (self.rate * self.seconds_until(end_us), 0.0),
             // A message of after the end has told of the next revolution already: that part is left for it.
-            late_us if late_us < 0 && late_us >= -MAX_GAP_US => {
+            late_us if (-MAX_GAP_US..0).contains(&late_us) => {
                 let rotation = self.rate * (late_us as f32 * 1e-6);
                 (rotation, -rotation)
             }

@@ -232,9 +232,9 @@ fn one(args: &Args, entry: &Entry, seed: u64) -> Outcome {
                     f64::from(p.x) - truth.x,
                     f64::from(p.y) - truth.y,
                     beamfix_sim::pose::wrap(f64::from(p.theta) - truth.theta).to_degrees(),
-                    c.xx.sqrt(),
-                    c.yy.sqrt(),
-                    c.tt.sqrt().to_degrees(),
+                    f64::from(c.xx).sqrt(),
+                    f64::from(c.yy).sqrt(),
+                    f64::from(c.tt).sqrt().to_degrees(),
                     if step.keyframe { "K " } else { "" },
                 );
             }

@@ -76,7 +76,7 @@ fn scip_steps_are_asked_for_or_read_from_the_echo() {
         let packets: Vec<_> = text.bytes().filter_map(|byte| parser.push(byte)).collect();
         let first = packets.first().and_then(|packet| packet.samples().next());
         (
-            first.map(|sample| (sample.angle_deg * 100.0).round() / 100.0),
+            first.map(|sample| (f64::from(sample.angle_deg) * 100.0).round() / 100.0),
             parser.counters().check_errors,
         )
     };

@@ -145,7 +145,7 @@ mod tests {
                 let point = ScanPoint::at(Bearing(k * 1000), 300 + 37 * k);
                 let place = placement.place(&point);
                 let one = (1u32 << placement.shift) as f32;
-                let expected = shape.to_cells(
+                let expected = shape.cells_at(
                     pose * Point::new(f32::from(point.x) * 1e-3, f32::from(point.y) * 1e-3),
                 );
                 let off = |got: u32, want: f32| (got as i32 as f32 / one - want).abs();
