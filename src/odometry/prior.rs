@@ -47,11 +47,11 @@ impl<const N: usize> Odometry<N> {
     /// Apart, as the other steps are: so that their memory is not on the stack during a match.
     #[inline(never)]
     pub(super) fn predict(&self, ego: EgoMotion, times: Times) -> Prior {
-        let wheels = wheel_motion(ego);
+        let wheels = ego.motion();
         let wheel_twist = wheels.map(|motion| Twist::from_motion(motion, times.seconds));
         let turn_rate = ego
-            .rotation
-            .filter(|rotation| rotation.is_finite() && times.seconds > 0.0)
+            .credible_rotation()
+            .filter(|_| times.seconds > 0.0)
             .map(|rotation| rotation / times.seconds);
         let last = self.motion.twist;
         let twist = wheel_twist.unwrap_or(Twist {
@@ -100,14 +100,6 @@ impl<const N: usize> Odometry<N> {
         let wild = farther(prior.pose, coasting, self.config.max_correction).is_some();
         (!wild).then_some(coasting)
     }
-}
-
-/// Motion by the wheels, unless it cannot be one.
-fn wheel_motion(ego: EgoMotion) -> Option<Pose> {
-    // No robot drives farther between two scans: a damaged message.
-    const FARTHEST: f32 = 32.0;
-    ego.motion()
-        .filter(|motion| motion.is_finite() && motion.distance() < FARTHEST)
 }
 
 /// How far apart two poses are (m, rad), if by more than `limit` metres or twice as many radians.

@@ -69,7 +69,7 @@ impl<const N: usize, const M: usize> Estimator<N> for MapLocalizer<'_, N, M> {
 
     fn update(&mut self, scan: &Scan<N>, ego: EgoMotion) -> Located {
         let motion = ego.motion().unwrap_or(Pose {
-            theta: ego.rotation.unwrap_or(0.0),
+            theta: ego.credible_rotation().unwrap_or(0.0),
             ..Pose::IDENTITY
         });
         // After a pause longer than any revolution, or for the first scan, the motion is taken to be the scan's own.
