@@ -66,6 +66,11 @@ pub mod odometry;
 pub mod pipeline;
 pub mod scan;
 pub mod sensor_model;
+// Only the tool runs it so far.
+#[cfg(not(feature = "internals"))]
+pub(crate) mod slam;
+#[cfg(feature = "internals")]
+pub mod slam;
 
 pub use config::ConfigError;
 pub use geometry::{EgoMotion, Point, Pose, Twist};

@@ -75,10 +75,35 @@ impl<const N: usize> VirtualScan<N> {
         at: Pose,
         keyframes: impl IntoIterator<Item = (&'a [ScanPoint], Pose)>,
     ) {
-        self.bins.fill(Bin::EMPTY);
+        self.clear();
         for (points, pose) in keyframes {
-            project(&mut self.bins, points, at.between(pose));
+            self.add(at, points, pose);
         }
+        self.finish();
+    }
+
+    /// Begins anew, for keyframes that are not all at hand at once: [`VirtualScan::add`] each, then
+    /// [`VirtualScan::finish`].
+    pub(crate) fn clear(&mut self) {
+        self.bins.fill(Bin::EMPTY);
+        self.points.clear();
+    }
+
+    /// Adds what a keyframe at `pose` saw, as seen from `at`.
+    pub(crate) fn add(&mut self, at: Pose, points: &[ScanPoint], pose: Pose) {
+        project(&mut self.bins, points, at.between(pose));
+    }
+
+    /// What was added so far shows at this distance in a direction (mm), if anything does.
+    pub(crate) fn range(&self, bearing: Bearing) -> Option<u32> {
+        self.bins
+            .get(Slots::new(N).of(bearing.0))
+            .filter(|bin| !bin.back)?
+            .mean()
+    }
+
+    /// Makes points of what was added.
+    pub(crate) fn finish(&mut self) {
         self.points.clear();
         for (k, bin) in self.bins.iter().enumerate() {
             if let Some(point) = bin.point(Slots::new(N).middle(k)) {

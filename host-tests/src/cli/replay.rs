@@ -3,6 +3,7 @@
 mod args;
 mod localize;
 mod odometry;
+mod slam;
 
 use std::process::ExitCode;
 
@@ -24,9 +25,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let written = [args.trajectory.as_deref(), args.picture.as_deref()];
     let map = args.map.as_deref().unwrap_or(&args.log);
     output::spare(&[&args.log, map], &written)?;
-    if args.mode == Mode::Slam {
-        bail!("--mode: slam is not built so far");
-    }
     let mut log = formats::read_with(&args.log, &args.options())?;
     // The log alone decides the poses; the tier only whether there is room.
     let directions = size::fitting(log.scans.iter().map(|scan| &scan.beams[..]));
@@ -39,7 +37,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let done = match args.mode {
         Mode::Localize => localize::run(args, &log, size)?,
-        Mode::Odometry | Mode::Slam => odometry::run(args, &log, (size, directions))?,
+        Mode::Odometry => odometry::run(args, &log, (size, directions))?,
+        Mode::Slam => slam::run(args, &log, (size, directions))?,
     };
     let name = args.log.display();
     output::remark(&[format!("{name}: {}", taken(args, &log))]);

@@ -78,8 +78,6 @@ pub struct Args {
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 pub enum Mode {
     Odometry,
-    /// Refused with a clear line until it is there.
-    #[value(hide = true)]
     Slam,
     Localize,
 }

@@ -1,0 +1,206 @@
+//! A map of keyframes that stays consistent when the robot comes back: pose-graph SLAM in fixed memory.
+//!
+//! | step | where |
+//! | --- | --- |
+//! | keep a scan as a keyframe, joined to the one before by what odometry tells | `keeping`, `store` |
+//! | find earlier keyframes that may see the same place | `loops`, `drift` |
+//! | match against what those around that place see together, check, wait for confirmation | `closing`, `verify` |
+//! | solve the pose graph, loops weighted by how well they agree | `solver`, `graph` |
+//! | remove the keyframe that tells least where the memory is full | `room`, `pruning` |
+//!
+//! Odometry goes in with every scan ([`Slam::update`]); everything else is done in slices in the time between scans
+//! ([`Slam::step`]). Poses are given in the frame of a keyframe ([`Placed`]), since keyframes still move.
+
+mod closing;
+mod config;
+mod drift;
+pub mod graph;
+mod keeping;
+mod loops;
+mod pruning;
+mod room;
+pub mod solver;
+mod store;
+mod verify;
+mod work;
+
+pub use config::SlamConfig;
+pub use pruning::Merged;
+
+use heapless::{Deque, Vec};
+
+use self::{
+    drift::Drift,
+    graph::{Graph, Slot},
+    solver::Solver,
+    store::PackedScan,
+    verify::Pending,
+    work::Work,
+};
+use crate::{
+    geometry::Pose,
+    linalg::Covariance,
+    matching::{icp::projective::Reference, virtual_scan::VirtualScan},
+    scan::ScanPoint,
+};
+
+/// SLAM for a controller of 192 KB: 224 keyframes of 144 points. Needs 161 KB itself.
+pub type Slam192k = Slam<224, 512, 880, 144, 360>;
+/// SLAM for a controller of 512 KB: 560 keyframes of 180 points. Needs 455 KB itself.
+pub type Slam512k = Slam<560, 1400, 2800, 180, 720>;
+
+/// Keyframes and loops since the start; every number wraps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Counters {
+    /// Keyframes made.
+    pub keyframes: u32,
+    /// Keyframes that were due and found no room, because pruning was not given the time.
+    pub no_room: u32,
+    /// Keyframes removed to make room for others.
+    pub pruned: u32,
+    /// Matches tried.
+    pub tried: u32,
+    /// Matches refused: no pose, too little agreement, or far from where the graph expects it.
+    pub refused: u32,
+    /// Matches that waited for others to confirm them.
+    pub waited: u32,
+    /// Loops closed.
+    pub loops: u32,
+    /// Loops given up again because the graph was too dense or had no room.
+    pub dropped: u32,
+    /// Solutions of the graph.
+    pub solved: u32,
+}
+
+/// Where a scan is: a pose in the frame of a keyframe.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Placed {
+    /// Number of the keyframe, as in [`graph::Node::id`].
+    pub keyframe: u32,
+    /// The lidar in its frame.
+    pub motion: Pose,
+}
+
+/// The last keyframe.
+#[derive(Debug, Clone, Copy)]
+struct Last {
+    slot: Slot,
+    id: u32,
+    /// Pose of the lidar by odometry, and its covariance.
+    odometry: Pose,
+    covariance: Covariance,
+}
+
+/// Most keyframes that wait to be looked at.
+const FRESH: usize = 16;
+/// Most loops that wait for confirmation.
+const PENDING: usize = 48;
+
+/// Keyframes, graph and all working memory: at most K keyframes of B points, E edges, L blocks of the solver's factor, and
+/// V directions of what several keyframes see together.
+///
+/// About `(75 + 2·B)·K + 44·E + 44·L + 16·B + 32·V` bytes.
+#[derive(Debug, Clone)]
+pub struct Slam<const K: usize, const E: usize, const L: usize, const B: usize, const V: usize> {
+    config: SlamConfig,
+    graph: Graph<K, E>,
+    scans: [PackedScan<B>; K],
+    solver: Solver<K, L>,
+    drift: Drift<K>,
+    /// Expected information of each keyframe (256ths of a bit); [`room::UNWEIGHED`] where it is to be weighed anew.
+    worth: [u16; K],
+    /// What keyframes see together, as points and as lines.
+    view: VirtualScan<V>,
+    reference: Reference<V>,
+    /// Points of the keyframe at hand, and of one of the others.
+    own: Vec<ScanPoint, B>,
+    other: Vec<ScanPoint, B>,
+    /// How many other keyframes saw what each of `own` met.
+    seen: [u8; B],
+    pending: Pending<PENDING>,
+    /// Keyframes whose place was not looked at so far.
+    fresh: Deque<Slot, FRESH>,
+    work: Work,
+    /// There are new edges since the last solution; and they contradict the poses.
+    changed: bool,
+    contradicted: bool,
+    /// The keyframe looked at again last, and how many were since there was a new keyframe.
+    again: Slot,
+    quiet: u16,
+    merged: Option<Merged>,
+    /// No keyframe can be removed until there is a new one.
+    stuck: bool,
+    last: Option<Last>,
+    counters: Counters,
+}
+
+impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: usize>
+    Slam<K, E, L, B, V>
+{
+    /// Nothing seen.
+    #[must_use]
+    pub const fn new(config: SlamConfig) -> Self {
+        Self {
+            config,
+            graph: Graph::new(),
+            scans: [PackedScan::EMPTY; K],
+            solver: Solver::new(),
+            drift: Drift::new(),
+            worth: [room::UNWEIGHED; K],
+            view: VirtualScan::new(),
+            reference: Reference::new(),
+            own: Vec::new(),
+            other: Vec::new(),
+            seen: [0; B],
+            pending: Pending::new(),
+            fresh: Deque::new(),
+            work: Work::Idle,
+            changed: false,
+            contradicted: false,
+            again: 0,
+            quiet: 0,
+            merged: None,
+            stuck: false,
+            last: None,
+            counters: Counters {
+                keyframes: 0,
+                no_room: 0,
+                pruned: 0,
+                tried: 0,
+                refused: 0,
+                waited: 0,
+                loops: 0,
+                dropped: 0,
+                solved: 0,
+            },
+        }
+    }
+
+    /// The keyframes' poses and what is known of the motions between them.
+    #[must_use]
+    pub const fn graph(&self) -> &Graph<K, E> {
+        &self.graph
+    }
+
+    /// What happened so far.
+    #[must_use]
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// The keyframe that was removed last; each is given once, and none is removed before it was taken.
+    pub const fn take_merged(&mut self) -> Option<Merged> {
+        self.merged.take()
+    }
+
+    /// Pose of the lidar in the map for a scan that [`Slam::update`] placed; `None` where its keyframe was removed (see
+    /// [`Slam::take_merged`]). Searches the keyframes.
+    #[must_use]
+    pub fn pose(&self, placed: &Placed) -> Option<Pose> {
+        let mut nodes = self.graph.nodes();
+        let (_, node) = nodes.find(|(_, node)| node.id == placed.keyframe)?;
+        Some(node.pose * placed.motion)
+    }
+}

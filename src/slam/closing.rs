@@ -1,0 +1,178 @@
+//! From a candidate to a loop: match, check, wait for others to confirm it.
+
+use heapless::Vec;
+
+use super::{
+    PENDING, Slam,
+    graph::{Edge, Kind, Slot},
+    loops::{self, CANDIDATES, Candidate},
+    store::PackedScan,
+    verify,
+};
+use crate::{
+    geometry::Pose,
+    linalg::{Covariance, Sym3},
+    matching::{
+        Match,
+        icp::projective::{IcpConfig, Search, align},
+    },
+    math,
+};
+
+/// A guess that may be this far off (m, 3σ) is none that a local match finds its pose from.
+const LOOSE: f32 = 0.3;
+/// Matches of one place are not independent, and their errors larger than each tells by this factor (of σ²).
+const MATCH_INFLATION: f32 = 4.0;
+
+impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: usize>
+    Slam<K, E, L, B, V>
+{
+    /// Earlier keyframes that may see the place of `slot`, the likeliest last.
+    pub(super) fn candidates(&mut self, slot: Slot) -> Vec<Candidate, CANDIDATES> {
+        let scan = self.scans.get(usize::from(slot));
+        let all_around = scan.is_some_and(PackedScan::sees_all_around);
+        let doubt = self.config.max_drift_factor;
+        self.drift.assign(&self.graph, slot, f32::INFINITY, doubt);
+        let mut found = loops::candidates(&self.graph, &self.drift, slot, all_around, &self.config);
+        found.reverse();
+        found
+    }
+
+    /// Matches a keyframe against what is seen around an earlier one; whether from several guesses.
+    pub(super) fn meet(&mut self, slot: Slot, candidate: &Candidate) -> bool {
+        let loose = 3.0 * math::sqrt(candidate.variance.0) > LOOSE;
+        // Where the graph does not know, the robot may as well be back at the very place.
+        let there = Pose::new(0.0, 0.0, candidate.guess.theta);
+        let guesses = [candidate.guess, there];
+        for guess in guesses.into_iter().take(if loose { 2 } else { 1 }) {
+            self.counters.tried = self.counters.tried.wrapping_add(1);
+            let found = self.matched(slot, candidate.slot, guess, loose);
+            let believed = found.filter(|found| {
+                let off = candidate.guess.between(found.pose);
+                verify::is_plausible(found, loose, &self.config)
+                    && verify::is_expected(off, candidate.variance, found)
+            });
+            if let Some(found) = believed {
+                self.propose(slot, candidate.slot, &found, loose);
+                return loose;
+            }
+            self.counters.refused = self.counters.refused.wrapping_add(1);
+        }
+        loose
+    }
+
+    /// The pose of `slot` in the frame of `earlier`, by a match against what is seen from `guess`.
+    fn matched(&mut self, slot: Slot, earlier: Slot, guess: Pose, loose: bool) -> Option<Match> {
+        self.drift
+            .assign(&self.graph, earlier, loops::WELL_KNOWN, 1.0);
+        let at = self.graph.pose(earlier)? * guess;
+        self.view.clear();
+        for other in loops::neighbours(&self.graph, &self.drift, slot, at, &self.config) {
+            let scan = self.scans.get(usize::from(other));
+            if let Some((pose, scan)) = self.graph.pose(other).zip(scan) {
+                scan.unpack(&mut self.other);
+                self.view.add(at, &self.other, pose);
+            }
+        }
+        self.view.finish();
+        self.reference.assign(self.view.as_slice());
+        self.scans.get(usize::from(slot))?.unpack(&mut self.own);
+        let config = IcpConfig {
+            search: if loose { Search::Global } else { Search::Local },
+            ..IcpConfig::DEFAULT
+        };
+        let found = align(&self.reference, &self.own, Pose::IDENTITY, &config).ok()?;
+        Some(Match {
+            pose: guess * found.pose,
+            covariance: found.covariance.rotated(guess),
+            ..found
+        })
+    }
+
+    /// Makes a match an edge, at once or when others confirm it.
+    fn propose(&mut self, slot: Slot, earlier: Slot, found: &Match, loose: bool) {
+        let (far, turned) = (
+            self.config.min_loop_sigma,
+            self.config.min_loop_heading_sigma,
+        );
+        let least = Covariance(Sym3::diagonal(far * far, far * far, turned * turned));
+        let told = Covariance(found.covariance.0.scaled(MATCH_INFLATION));
+        let Some(information) = told.plus(&least).information() else {
+            return;
+        };
+        let edge = Edge {
+            from: earlier,
+            to: slot,
+            kind: Kind::Loop,
+            motion: found.pose,
+            information,
+        };
+        if loose {
+            self.pending.push(edge);
+            self.counters.waited = self.counters.waited.wrapping_add(1);
+            self.confirm(&edge);
+        } else {
+            self.close(edge);
+        }
+    }
+
+    /// Closes a new loop that waits, and those that close a cycle with it, if these are enough and more than those that do
+    /// not.
+    fn confirm(&mut self, new: &Edge) {
+        let (mut votes, mut against) = (0u8, 0u8);
+        for edge in self.pending.as_slice() {
+            match verify::closes(&self.graph, new, edge, &self.config) {
+                Some(true) => votes = votes.saturating_add(1),
+                Some(false) => against = against.saturating_add(1),
+                None => {}
+            }
+        }
+        if votes < self.config.min_votes || votes <= against {
+            return;
+        }
+        let mut confirmed: Vec<Edge, PENDING> = Vec::new();
+        let (graph, config) = (&self.graph, &self.config);
+        self.pending.retain(|edge| {
+            let closes = verify::closes(graph, new, edge, config) == Some(true);
+            let taken = edge == new || closes;
+            if taken {
+                // As many as wait at most: it fits.
+                let _ = confirmed.push(*edge);
+            }
+            !taken
+        });
+        self.contradicted = true;
+        for edge in confirmed {
+            self.close(edge);
+        }
+    }
+
+    fn close(&mut self, edge: Edge) {
+        // The chain must find room in any case.
+        let room = self.graph.edges().len() + super::FRESH < E;
+        if room && self.graph.join(edge).is_ok() {
+            self.counters.loops = self.counters.loops.wrapping_add(1);
+            self.changed = true;
+        } else {
+            self.counters.dropped = self.counters.dropped.wrapping_add(1);
+        }
+    }
+
+    /// Removes some loops where there are most; whether there were any.
+    pub(super) fn thin(&mut self) -> bool {
+        let mut thinned = false;
+        for _ in 0..E.div_ceil(64) {
+            let degree = |slot| self.graph.edges_at(slot).count();
+            let crowd = |edge: &&Edge| degree(edge.from).min(degree(edge.to));
+            let edges = self.graph.edges().iter();
+            let loops = edges.filter(|edge| edge.kind == Kind::Loop);
+            let Some(most) = loops.max_by_key(crowd).copied() else {
+                break;
+            };
+            self.graph.retain_edges(|edge| *edge != most);
+            self.counters.dropped = self.counters.dropped.wrapping_add(1);
+            thinned = true;
+        }
+        thinned
+    }
+}
