@@ -1,4 +1,4 @@
-//! Grids, fields, beam models, and where a robot is in a map.
+//! Grids, fields, beam models, where a robot is in a map, and maps made by SLAM.
 
 mod beam_model;
 #[path = "../common/mod.rs"]
@@ -7,3 +7,4 @@ mod fields;
 mod grid;
 mod localization;
 mod presence;
+mod slam;

@@ -3,7 +3,7 @@
 use beamfix::slam::{Slam, Slam192k, Slam512k, SlamConfig};
 use beamfix_sim::world::World;
 
-use crate::drive::{drive, path};
+use super::drive::{drive, path};
 
 /// A ring of corridors, 20 m by 14 m, with doorways and cabinets that tell one place from another.
 fn ring() -> World {
