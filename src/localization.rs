@@ -33,7 +33,6 @@ use crate::{
         correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid},
         field,
     },
-    math,
     scan::{ScanPoint, thinning::thinned},
 };
 pub use config::LocalizerConfig;
@@ -325,10 +324,4 @@ impl<'a, const N: usize> Localizer<'a, N> {
         self.state = State::Tracking;
         Verdict::Tracking(found, quality)
     }
-}
-
-/// Whether two poses are the same place: within `metres` and `radians`.
-pub(crate) fn alike(a: Pose, b: Pose, metres: f32, radians: f32) -> bool {
-    let (x, y) = (b.x - a.x, b.y - a.y);
-    x * x + y * y <= metres * metres && math::abs(math::wrap_angle(b.theta - a.theta)) <= radians
 }

@@ -12,6 +12,7 @@ mod prior;
 mod replay;
 mod scenes;
 mod simulate;
+mod tune;
 mod verify;
 mod watch;
 
@@ -44,6 +45,7 @@ enum Command {
     Bench(bench::Args),
     Card(card::Args),
     Scenes(scenes::Args),
+    Tune(tune::Args),
     Verify(verify::Args),
     Watch(watch::Args),
 }
@@ -64,6 +66,7 @@ pub fn run() -> ExitCode {
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Card(args)) => card::run(&args),
         Some(Command::Scenes(args)) => scenes::run(&args),
+        Some(Command::Tune(args)) => tune::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
         Some(Command::Watch(args)) => watch::run(&args),
         Some(Command::Simulate(args)) => simulate::run(&args),

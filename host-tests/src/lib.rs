@@ -10,4 +10,5 @@ pub mod pipeline;
 pub mod report;
 pub mod shared;
 pub mod size;
+pub mod tuning;
 pub mod watch;

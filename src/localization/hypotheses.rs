@@ -1,7 +1,6 @@
 //! Candidates for the pose, and how each has fitted so far.
 
-use super::alike;
-use crate::geometry::Pose;
+use crate::{geometry::Pose, math};
 
 /// Most candidates.
 pub const MOST: usize = 32;
@@ -132,6 +131,12 @@ impl Hypotheses {
             _ => f32::INFINITY,
         }
     }
+}
+
+/// Whether two poses are the same place: within `metres` and `radians`.
+pub(super) fn alike(a: Pose, b: Pose, metres: f32, radians: f32) -> bool {
+    let (x, y) = (b.x - a.x, b.y - a.y);
+    x * x + y * y <= metres * metres && math::abs(math::wrap_angle(b.theta - a.theta)) <= radians
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! The search for the pose over the whole map: every heading, every block of 4 by 4 cells, in bounded steps.
 
 use super::{
-    LocalizerConfig, alike,
-    hypotheses::{Hypotheses, Hypothesis, MOST},
+    config::LocalizerConfig,
+    hypotheses::{Hypotheses, Hypothesis, MOST, alike},
     quality::Quality,
 };
 use crate::{

@@ -4,6 +4,7 @@
 //! pyramid of maxima bounds the score of a whole block of poses at once, so blocks that cannot win are left out, and what
 //! is found is exactly the best of all poses, whatever the guess.
 
+mod config;
 #[cfg(not(feature = "internals"))]
 pub(crate) mod pyramid;
 #[cfg(feature = "internals")]
@@ -17,7 +18,6 @@ use super::{
     window_covariance::{AS_GOOD, REACH, WindowCovariance},
 };
 use crate::{
-    config::{self, ConfigError},
     geometry::Pose,
     math,
     scan::{
@@ -26,102 +26,20 @@ use crate::{
     },
     sensor_model::likelihood_field::{Field, placement::Placement},
 };
+pub use config::CorrelativeConfig;
 pub use pyramid::Pyramid;
-use rotated::Rotated;
 #[cfg(feature = "internals")]
 pub use rotated::sum_four;
-use search::{BLOCKS, Block};
+pub use search::Correlator;
 #[cfg(feature = "internals")]
 pub use window::{Candidate, Near, Window};
 #[cfg(not(feature = "internals"))]
 pub(crate) use window::{Candidate, Near, Window};
 
-/// Where to look, and what counts as found.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CorrelativeConfig {
-    /// Half the window's side (m), rounded up to whole blocks of the pyramid's top. Default 0.25.
-    pub position_range: f32,
-    /// Half the window's angle (rad). Default 0.2094: 12°.
-    pub heading_range: f32,
-    /// From one heading to the next (rad); 0: as far as the farthest point moves by a cell. Default 0.
-    pub heading_step: f32,
-    /// Least score, 0…1: a share of the peak above unexplored. Default 0.3.
-    pub min_score: f32,
-    /// Two poses this much alike in score, this far apart, are ambiguous (0…1; above 1: not looked for). Default 2.
-    pub max_ambiguity: f32,
-    /// Nearer modes are the same pose (m). Default 0.5.
-    pub min_separation: f32,
-    /// Each beam's log-likelihood counts so much in the covariance: neighbours err alike. Default 0.1.
-    pub temper: f32,
-}
-
-impl CorrelativeConfig {
-    /// Around a good guess, such as wheel odometry.
-    pub const DEFAULT: Self = Self {
-        position_range: 0.25,
-        heading_range: 0.2094,
-        heading_step: 0.0,
-        min_score: 0.3,
-        max_ambiguity: 2.0,
-        min_separation: 0.5,
-        temper: 0.1,
-    };
-
-    /// The same, if every setting is within its range; usable in a `const`.
-    ///
-    /// # Errors
-    /// [`ConfigError`] names the first setting that is not.
-    pub const fn checked(self) -> Result<Self, ConfigError> {
-        let checks = [
-            config::within("position_range", self.position_range, 0.0, 1000.0),
-            config::within("heading_range", self.heading_range, 0.0, 3.15),
-            config::within("heading_step", self.heading_step, 0.0, 1.0),
-            config::within("min_score", self.min_score, 0.0, 1.0),
-            config::within("max_ambiguity", self.max_ambiguity, 0.0, 10.0),
-            config::within("min_separation", self.min_separation, 0.0, 1000.0),
-            config::within("temper", self.temper, 1e-4, 1.0),
-        ];
-        match config::all(&checks) {
-            Ok(()) => Ok(self),
-            Err(error) => Err(error),
-        }
-    }
-}
-
-impl Default for CorrelativeConfig {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
 /// Headings closer than this (rad) belong to the same mode.
 const SAME_HEADING: f32 = 0.35;
-/// Working memory for scans of at most N beams: 8·N bytes and 1.5 KB for the blocks.
-#[derive(Debug, Clone)]
-pub struct Correlator<const N: usize> {
-    rotated: Rotated<N>,
-    blocks: heapless::Vec<Block, BLOCKS>,
-    /// Sums looked up so far, for measuring.
-    lookups: u64,
-}
 
 impl<const N: usize> Correlator<N> {
-    /// Empty working memory.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            rotated: Rotated::new(),
-            blocks: heapless::Vec::new(),
-            lookups: 0,
-        }
-    }
-
-    /// Bytes looked up so far, for measuring.
-    #[must_use]
-    pub fn lookups(&self) -> u64 {
-        self.lookups
-    }
-
     /// The best pose in the window around `guess`, to a cell and a step of the heading.
     ///
     /// At most N points are used, evenly spread. The covariance is that of the scores around the best pose. Along a
@@ -284,12 +202,6 @@ impl<const N: usize> Correlator<N> {
             }
         }
         spread
-    }
-}
-
-impl<const N: usize> Default for Correlator<N> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

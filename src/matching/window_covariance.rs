@@ -81,7 +81,7 @@ impl WindowCovariance {
 
     /// The direction along which the scores of the window are about even, if there is one.
     pub fn open(&self, covariance: &Covariance, lever: f32) -> Option<Open> {
-        // Even scores over five steps have a variance of 2.08 steps: from 1.44 on nothing holds the pose there.
+        /// Variance (in steps) from which on nothing holds the pose along a direction: even scores over five steps have 2.08.
         const EVEN: f32 = 1.44;
         let [_, _, (largest, direction)] = covariance.0.theta_scaled(lever).eigen();
         let [x, y, t] = direction;

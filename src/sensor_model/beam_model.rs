@@ -112,7 +112,9 @@ impl Default for BeamModel {
 
 /// Share of a normal distribution below `x` standard deviations; off by at most 8e-8 (Abramowitz, Stegun 26.2.17).
 fn normal_below(x: f32) -> f32 {
+    /// The formula's p.
     const P: f32 = 0.231_641_9;
+    /// 1/√(2π).
     const PEAK: f32 = 0.398_942_28;
     let t = 1.0 / (1.0 + P * math::abs(x));
     let poly = t

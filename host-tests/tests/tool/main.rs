@@ -6,4 +6,5 @@ mod common;
 mod fields;
 mod recordings;
 mod scenes;
+mod tuning;
 mod watch;

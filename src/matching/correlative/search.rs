@@ -1,24 +1,49 @@
 //! Branch and bound: a block of poses is looked into only if its bound is above the best score so far.
 
 use super::{
-    Correlator,
     pyramid::Pyramid,
+    rotated::Rotated,
     window::{Candidate, Near, SIDE, Window},
 };
 use crate::scan::ScanPoint;
 
 /// Most blocks of one heading.
-pub(super) const BLOCKS: usize = (SIDE * SIDE) as usize;
+const BLOCKS: usize = (SIDE * SIDE) as usize;
 
 /// Poses `x..x + stride`, `y..y + stride` of one heading, and a bound that none of their scores exceeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Block {
+struct Block {
     bound: u32,
     x: i16,
     y: i16,
 }
 
+/// Working memory for scans of at most N beams: 8·N bytes and 1.5 KB for the blocks.
+#[derive(Debug, Clone)]
+pub struct Correlator<const N: usize> {
+    pub(super) rotated: Rotated<N>,
+    blocks: heapless::Vec<Block, BLOCKS>,
+    /// Sums looked up so far, for measuring.
+    pub(super) lookups: u64,
+}
+
 impl<const N: usize> Correlator<N> {
+    /// Empty working memory.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            rotated: Rotated::new(),
+            blocks: heapless::Vec::new(),
+            lookups: 0,
+        }
+    }
+
+    /// Bytes looked up so far, for measuring.
+    #[must_use]
+    pub fn lookups(&self) -> u64 {
+        self.lookups
+    }
+
     /// The window's best cell whose sum is above `least`, and outside of what is `near` to another.
     pub fn search(
         &mut self,
@@ -115,6 +140,12 @@ impl<const N: usize> Correlator<N> {
         while let Some(part) = take_best(&mut parts, *bar) {
             self.split(pyramid, below, part, heading, near, bar, best);
         }
+    }
+}
+
+impl<const N: usize> Default for Correlator<N> {
+    fn default() -> Self {
+        Self::new()
     }
 }
 

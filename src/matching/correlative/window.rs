@@ -1,6 +1,6 @@
 //! The window of poses that is searched, as whole cells and headings.
 
-use super::{CorrelativeConfig, pyramid::Pyramid};
+use super::{config::CorrelativeConfig, pyramid::Pyramid};
 use crate::{
     config::ConfigError,
     geometry::{Point, Pose},

@@ -1,7 +1,7 @@
 //! Slopes and curvatures summed over a scan's beams, and the Newton step and the match that follow from them.
 
 use super::{
-    FieldConfig,
+    config::FieldConfig,
     pass::{CHUNK, Part, Pass, TOGETHER},
 };
 use crate::{

@@ -17,15 +17,16 @@
 //! | [`minimisation`] | [`PointToLine`] | point to point, Censi's constrained form |
 
 pub mod correspondence;
+mod limits;
 pub mod minimisation;
 pub mod normals;
+mod pair;
 pub mod rejection;
 pub mod selection;
 mod verdict;
 pub mod weighting;
 
 use crate::{
-    config::{self, ConfigError},
     geometry::{Point, Pose},
     matching::{Match, MatchError, degeneracy},
     math,
@@ -33,8 +34,11 @@ use crate::{
 };
 use correspondence::{Correspond, Projection};
 use heapless::Vec;
+pub use limits::Limits;
 use minimisation::{Minimise, PointToLine};
+pub use normals::Cloud;
 use normals::Surface;
+pub use pair::Pair;
 use rejection::{Nothing, Reject};
 use selection::{All, Select};
 use verdict::Determined;
@@ -83,97 +87,6 @@ impl<const B: usize> Projective<B> {
             },
         }
     }
-}
-
-/// When the loop ends, and what it needs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
-    /// Most passes. Default 30.
-    pub max_iterations: u8,
-    /// Longest last step (m). Default 1e-4: a hundredth of the noise of a range.
-    pub translation_tolerance: f32,
-    /// Largest rotation of the last step (rad). Default 1e-4.
-    pub rotation_tolerance: f32,
-    /// Fewest pairs that must count. Default 30.
-    pub min_pairs: u16,
-    /// Neighbours on each side that a surface's line is laid through. Default 4: 9 points at 1° see 0.3 m of a wall 2 m
-    /// away.
-    pub neighbours: u8,
-    /// Standard deviation of a range (m): the least noise that the covariance assumes. Default 0.01.
-    pub min_range_sigma: f32,
-}
-
-impl Limits {
-    /// For scans of a few hundred beams.
-    pub const DEFAULT: Self = Self {
-        max_iterations: 30,
-        translation_tolerance: 1e-4,
-        rotation_tolerance: 1e-4,
-        min_pairs: 30,
-        neighbours: 4,
-        min_range_sigma: 0.01,
-    };
-
-    /// The same, if every setting is within its range; usable in a `const`.
-    ///
-    /// # Errors
-    /// [`ConfigError`] names the first setting that is not.
-    pub const fn checked(self) -> Result<Self, ConfigError> {
-        let checks = [
-            config::within("max_iterations", self.max_iterations as f32, 1.0, 255.0),
-            config::within(
-                "translation_tolerance",
-                self.translation_tolerance,
-                0.0,
-                1.0,
-            ),
-            config::within("rotation_tolerance", self.rotation_tolerance, 0.0, 1.0),
-            config::within("min_pairs", self.min_pairs as f32, 3.0, 65535.0),
-            config::within("neighbours", self.neighbours as f32, 1.0, 64.0),
-            config::within("min_range_sigma", self.min_range_sigma, 1e-4, 1.0),
-        ];
-        match config::all(&checks) {
-            Ok(()) => Ok(self),
-            Err(error) => Err(error),
-        }
-    }
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
-/// A scan and the surfaces that its points lie on, both in the order of measurement and of the same length.
-#[derive(Debug, Clone, Copy)]
-pub struct Cloud<'a> {
-    /// Places hit (mm).
-    pub points: &'a [ScanPoint],
-    /// The line through each and its neighbours.
-    pub surfaces: &'a [Surface],
-}
-
-/// A point and its correspondence, both in the reference's frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pair {
-    /// Where the point comes to lie (m).
-    pub place: Point,
-    /// Its surface's normal; (0, 0) where it has none.
-    pub normal: [f32; 2],
-    /// Index of the point in its scan.
-    pub point: u16,
-    /// Index of the reference point.
-    pub reference: u16,
-    /// Distance from the reference point (m).
-    pub distance: f32,
-    /// Signed distance from the reference point's line (m), towards the reference's lidar; `distance` where it has
-    /// no line.
-    pub across: f32,
-    /// What is minimised: one of the two above.
-    pub residual: f32,
-    /// What the pair counts; 0 once it is rejected.
-    pub weight: f32,
 }
 
 /// Room for [`align`]: about 77·N bytes. N is the most points a scan may have; further ones are left out.
@@ -303,38 +216,6 @@ fn associate<const N: usize, S, C, W, R, M>(
         pair.residual = stages.minimisation.residual(&pair);
         // As many pairs as points at most: it fits.
         let _ = pairs.push(pair);
-    }
-}
-
-impl Pair {
-    /// The point at `place` and the `found`-th reference point.
-    fn new(
-        reference: Cloud<'_>,
-        place: Point,
-        normal: [f32; 2],
-        index: usize,
-        found: usize,
-    ) -> Option<Self> {
-        let (point, surface) = (reference.points.get(found)?, reference.surfaces.get(found)?);
-        let off = Point::new(
-            place.x - f32::from(point.x) * 1e-3,
-            place.y - f32::from(point.y) * 1e-3,
-        );
-        let distance = off.norm();
-        Some(Self {
-            place,
-            normal,
-            point: index as u16,
-            reference: found as u16,
-            distance,
-            across: if surface.is_some() {
-                surface.across(place)
-            } else {
-                distance
-            },
-            residual: distance,
-            weight: 1.0,
-        })
     }
 }
 

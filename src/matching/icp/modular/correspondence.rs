@@ -4,7 +4,7 @@ pub mod nearest;
 
 use crate::{
     geometry::Point,
-    matching::icp::modular::Cloud,
+    matching::icp::modular::normals::Cloud,
     math,
     scan::{ScanPoint, slots::Slots},
 };

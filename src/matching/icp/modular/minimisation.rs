@@ -5,7 +5,7 @@
 use crate::{
     geometry::{Point, Pose},
     linalg::Sym3,
-    matching::icp::modular::{Cloud, Pair},
+    matching::icp::modular::{normals::Cloud, pair::Pair},
     math,
 };
 

@@ -2,12 +2,20 @@
 
 use crate::{
     geometry::Point,
-    matching::icp::modular::Cloud,
     scan::{
         ScanPoint,
         surface::{Fit, Gap},
     },
 };
+
+/// A scan and the surfaces that its points lie on, both in the order of measurement and of the same length.
+#[derive(Debug, Clone, Copy)]
+pub struct Cloud<'a> {
+    /// Places hit (mm).
+    pub points: &'a [ScanPoint],
+    /// The line through each and its neighbours.
+    pub surfaces: &'a [Surface],
+}
 
 /// A line through a point and its neighbours. 20 bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]

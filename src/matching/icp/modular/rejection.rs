@@ -5,7 +5,7 @@
 pub mod trimmed;
 
 use crate::{
-    matching::icp::modular::{Cloud, Pair},
+    matching::icp::modular::{normals::Cloud, pair::Pair},
     math,
 };
 pub use trimmed::Trimmed;

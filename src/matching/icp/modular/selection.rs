@@ -1,7 +1,7 @@
 //! First stage: which points take part.
 
 use crate::{
-    matching::icp::modular::{Cloud, normals::Surface},
+    matching::icp::modular::normals::{Cloud, Surface},
     math,
     scan::ScanPoint,
 };
@@ -152,6 +152,7 @@ impl Default for NormalSpace {
     }
 }
 
+/// Directions of surfaces that are told apart: half a turn in bins of 11.25 degrees.
 const BINS: usize = 16;
 
 /// Bin of a surface's direction, `None` where there is no surface.

@@ -6,7 +6,9 @@ use crate::{
     matching::{
         Match, MatchError,
         degeneracy::{self, Open},
-        icp::modular::{Cloud, Limits, Pair, minimisation::normal_equations},
+        icp::modular::{
+            limits::Limits, minimisation::normal_equations, normals::Cloud, pair::Pair,
+        },
     },
     math,
     scan::ScanPoint,

@@ -5,7 +5,7 @@
 //! multiplied, and the second sees the first's.
 
 use crate::{
-    matching::icp::modular::{Cloud, Pair},
+    matching::icp::modular::{normals::Cloud, pair::Pair},
     math,
 };
 

@@ -1,7 +1,7 @@
 //! Trimmed ICP with the overlap estimated: Chetverikov, Stepanov, Krsek, IVC 23 (2005).
 
 use crate::{
-    matching::icp::modular::{Cloud, Pair, rejection::Reject},
+    matching::icp::modular::{normals::Cloud, pair::Pair, rejection::Reject},
     math,
 };
 
@@ -26,6 +26,7 @@ pub struct Trimmed {
     counts: [u16; BINS],
 }
 
+/// Bins of the histogram of residuals that the share is read from.
 const BINS: usize = 64;
 
 impl Default for Trimmed {
