@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # evo's alignment forgives a mirrored path: a clockwise lidar read as a counter-clockwise one scores an error of 0.
 #
-# A lidar whose sense of rotation is taken wrong gives the mirror image of the truth as map and path. The guess before running it:
-# evo_ape --align shows it as a large error, for the alignment is a rotation and a shift, never a reflection.
+# A lidar whose sense of rotation is taken wrong gives the mirror image of the truth as map and path. The guess before
+# running it: evo_ape --align shows it as a large error, for the alignment is a rotation and a shift, never a reflection.
 # Seen: 0.000 m. The rotation is one in space, and in a flat world half a turn about a horizontal axis is the mirror image.
-# --correct_scale and --project_to_plane xy do not help. Without alignment, with --align_origin, or compared by angle
-# (-r angle_deg: 180 degrees everywhere) the fault is there.
+# --correct_scale and --project_to_plane xy do not help. Without alignment, with --align_origin, or compared by angle (-r
+# angle_deg: 180 degrees everywhere) the fault is there.
 # For who scores a lidar's odometry: look at the alignment's rotation (-v), compare angles too, or align in the plane.
 set -euo pipefail
 folder=$(mktemp -d)

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # evo's error per angle pairs headings whole turns apart when it takes all pairs.
 #
-# evo_rpe --delta 90 --delta_unit d --all_pairs asks for the error over each quarter turn. The guess before running it: pairs of
-# poses between which the robot has turned by 90 degrees, as without --all_pairs.
-# Seen: pairs whose headings differ by 90 degrees, however far the robot has turned between them: 90, 270, 450 and so on, to the end of the
-# recording. A gyroscope with 1 % of scale error, spinning for 20 turns, has 0.9 degrees per quarter turn without the option and
-# 24 on average with it, and the longer the recording, the more.
+# evo_rpe --delta 90 --delta_unit d --all_pairs asks for the error over each quarter turn. The guess before running it:
+# pairs of poses between which the robot has turned by 90 degrees, as without --all_pairs.
+# Seen: pairs whose headings differ by 90 degrees, however far the robot has turned between them: 90, 270, 450 and so on, to
+# the end of the recording. A gyroscope with 1 % of scale error, spinning for 20 turns, has 0.9 degrees per quarter turn
+# without the option and 24 on average with it, and the longer the recording, the more.
 # For who measures heading per turn: leave --all_pairs out for angles, or cut the recording into turns first.
 set -euo pipefail
 folder=$(mktemp -d)

@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # PyLidar3 (YDLIDAR X4, G4) averages what falls into one degree: a beam without a return halves the range beside it.
 #
-# The lidar sends about 700 beams a turn with bearings of 1/64 degree and range 0 where nothing came back. The guess before running it: the
-# dictionary that StartScanning yields, one range for each whole degree, keeps the last or the nearest beam and leaves 0 out.
-# Seen: the mean of all beams of that degree, 0 included. A wall at 2000 mm whose beams come back every second time stands at 666,
-# 1000 and 1333 mm, and at the edge between 1 m and 5 m there is a point at 3 m.
-# For who has recordings of it: they hold walls at fractions of the true range, and no filter by range finds them; record the
-# serial bytes instead. Degrees without any beam are 0 as well, the same as no return.
+# The lidar sends about 700 beams a turn with bearings of 1/64 degree and range 0 where nothing came back. The guess before
+# running it: the dictionary that StartScanning yields, one range for each whole degree, keeps the last or the nearest beam
+# and leaves 0 out.
+# Seen: the mean of all beams of that degree, 0 included. A wall at 2000 mm whose beams come back every second time stands
+# at 666, 1000 and 1333 mm, and at the edge between 1 m and 5 m there is a point at 3 m.
+# For who has recordings of it: they hold walls at fractions of the true range, and no filter by range finds them; record
+# the serial bytes instead. Degrees without any beam are 0 as well, the same as no return.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
 # Two drivers for RPLIDAR's express mode give the same beam bearings 11 degrees apart.
 #
-# In a capsule of the express mode each beam carries six bits that say by how many eighths of a degree its bearing differs from the even
-# spacing. The guess before running it: pyrplidar and rplidar-roboticia (module rplidar) agree to a few hundredths of a degree.
-# Seen: pyrplidar takes the six bits as a number from 0 to 7.9 degrees, which is what the maker's SDK does, rplidar-roboticia as sign and five bits,
-# -3.9 to 3.9 degrees, which is how the maker's document reads. And it numbers the beams
-# from 1, so all of its bearings are one beam (0.4 degrees) further. Apart by 0.4 degrees up to an offset of 3.9, by 4.4 at 4, by 11.4 at 7.5.
+# In a capsule of the express mode each beam carries six bits that say by how many eighths of a degree its bearing differs
+# from the even spacing. The guess before running it: pyrplidar and rplidar-roboticia (module rplidar) agree to a few
+# hundredths of a degree.
+# Seen: pyrplidar takes the six bits as a number from 0 to 7.9 degrees, which is what the maker's SDK does,
+# rplidar-roboticia as sign and five bits, -3.9 to 3.9 degrees, which is how the maker's document reads. And it numbers the
+# beams from 1, so all of its bearings are one beam (0.4 degrees) further. Apart by 0.4 degrees up to an offset of 3.9, by
+# 4.4 at 4, by 11.4 at 7.5.
 # For who replays recordings of either: the same room differs by more than a matcher bridges. We decode as the SDK does.
 set -euo pipefail
 folder=$(mktemp -d)

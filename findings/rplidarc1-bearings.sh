@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # rplidarc1 reads the bearing's low bits wrongly: neighbouring beams change places, each up to a degree off.
 #
-# A standard point of an RPLIDAR carries its bearing in 1/64 degree, seven bits in one byte and eight in the next. The guess before running it:
-# a driver made for the C1 returns it as it is, perhaps rounded to hundredths.
-# Seen: a saw tooth two degrees long. 100.0, 100.5, 101.0, 101.5, 102.0 degrees come out as 100, 101, 100, 101, 102: right at even degrees only, two
-# beams a degree apart share a bearing, and 100.25 becomes 100.67. Ranges and quality are right.
-# For who uses it: at 4 m a degree is 7 cm, so a wall seen at a slant becomes a comb. Take the bytes instead: two beams of one
-# bearing cannot be told apart afterwards.
+# A standard point of an RPLIDAR carries its bearing in 1/64 degree, seven bits in one byte and eight in the next. The guess
+# before running it: a driver made for the C1 returns it as it is, perhaps rounded to hundredths.
+# Seen: a saw tooth two degrees long. 100.0, 100.5, 101.0, 101.5, 102.0 degrees come out as 100, 101, 100, 101, 102: right
+# at even degrees only, two beams a degree apart share a bearing, and 100.25 becomes 100.67. Ranges and quality are right.
+# For who uses it: at 4 m a degree is 7 cm, so a wall seen at a slant becomes a comb. Take the bytes instead: two beams of
+# one bearing cannot be told apart afterwards.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

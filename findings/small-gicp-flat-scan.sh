@@ -3,11 +3,12 @@
 #
 # A 2-D scan given to a 3-D matcher has z = 0 everywhere, so each point's surface is the scan's own plane and its normal
 # points up: nothing pulls in x, y or heading. The guess before running it: PLANE_ICP stays where it starts.
-# Seen: without noise it is the best of all, 1e-13 m off. A straight wall has no width either, so which of the two empty directions
-# becomes the normal is left to rounding, and it takes one in the plane often enough. With a micrometre of noise all normals point up:
-# no iteration, the start is the answer, `converged` is true, the error is 0 and every point an inlier. GICP moves as it should.
-# For who compares matchers: a test on exact walls says nothing here, and neither `converged` nor the error tells; an eigenvalue
-# of H of 0 does.
+# Seen: without noise it is the best of all, 1e-13 m off. A straight wall has no width either, so which of the two empty
+# directions becomes the normal is left to rounding, and it takes one in the plane often enough. With a micrometre of noise
+# all normals point up: no iteration, the start is the answer, `converged` is true, the error is 0 and every point an
+# inlier. GICP moves as it should.
+# For who compares matchers: a test on exact walls says nothing here, and neither `converged` nor the error tells; an
+# eigenvalue of H of 0 does.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
