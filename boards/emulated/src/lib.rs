@@ -11,6 +11,7 @@ pub mod drivers;
 pub mod fields;
 pub mod maps;
 mod panic;
+pub mod pipeline;
 pub mod replay;
 pub mod stack;
 pub mod stages;

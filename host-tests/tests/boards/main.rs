@@ -2,6 +2,7 @@
 
 mod bench;
 mod bits;
+mod c;
 mod card;
 #[path = "../common/mod.rs"]
 mod common;

@@ -31,10 +31,16 @@ impl<const N: usize> Reference<N> {
             N as u16
         };
         Self {
-            lines: [Line::NONE; N],
+            lines: Self::no_lines(),
             count: 0,
             directions: if directions < all { directions } else { all },
         }
+    }
+
+    /// Apart: so a reference that is made where it stays needs no second one on the stack.
+    #[inline(never)]
+    const fn no_lines() -> [Line; N] {
+        [Line::NONE; N]
     }
 
     /// The line seen in each direction, counter-clockwise from straight ahead.

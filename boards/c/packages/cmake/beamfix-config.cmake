@@ -1,0 +1,55 @@
+# beamfix::beamfix, the static library for the processor that is compiled for. A Rust target's name in BEAMFIX_TARGET overrides the
+# choice: the folders of lib/ are what there is.
+if(NOT BEAMFIX_TARGET)
+    if(NOT CMAKE_CROSSCOMPILING)
+        set(BEAMFIX_TARGET host)
+    else()
+        # What the compiler says by the flags in use.
+        string(TOUPPER "${CMAKE_BUILD_TYPE}" _beamfix_type)
+        separate_arguments(_beamfix_flags UNIX_COMMAND "${CMAKE_C_FLAGS} ${CMAKE_C_FLAGS_${_beamfix_type}}")
+        get_directory_property(_beamfix_options COMPILE_OPTIONS)
+        foreach(_beamfix_option IN LISTS _beamfix_options)
+            if(NOT _beamfix_option MATCHES "^\\$<")
+                list(APPEND _beamfix_flags ${_beamfix_option})
+            endif()
+        endforeach()
+        execute_process(
+            COMMAND ${CMAKE_C_COMPILER} ${_beamfix_flags} -dM -E -x c /dev/null
+            OUTPUT_VARIABLE _beamfix_macros ERROR_QUIET)
+        if(_beamfix_macros MATCHES "__ARM_PCS_VFP 1")
+            set(_beamfix_hard hf)
+        else()
+            set(_beamfix_hard "")
+        endif()
+        if(_beamfix_macros MATCHES "__ARM_ARCH_6M__ 1")
+            set(BEAMFIX_TARGET thumbv6m-none-eabi)
+        elseif(_beamfix_macros MATCHES "__ARM_ARCH_7M__ 1")
+            set(BEAMFIX_TARGET thumbv7m-none-eabi)
+        elseif(_beamfix_macros MATCHES "__ARM_ARCH_7EM__ 1")
+            set(BEAMFIX_TARGET thumbv7em-none-eabi${_beamfix_hard})
+        elseif(_beamfix_macros MATCHES "__ARM_ARCH_8M_MAIN__ 1")
+            set(BEAMFIX_TARGET thumbv8m.main-none-eabi${_beamfix_hard})
+        elseif(_beamfix_macros MATCHES "__riscv_xlen 32" AND _beamfix_macros MATCHES "__riscv_float_abi_soft 1")
+            if(_beamfix_macros MATCHES "__riscv_atomic 1")
+                set(BEAMFIX_TARGET riscv32imac-unknown-none-elf)
+            else()
+                set(BEAMFIX_TARGET riscv32imc-unknown-none-elf)
+            endif()
+        endif()
+    endif()
+endif()
+
+set(_beamfix_archive "${CMAKE_CURRENT_LIST_DIR}/lib/${BEAMFIX_TARGET}/libbeamfix.a")
+if(NOT BEAMFIX_TARGET OR NOT EXISTS "${_beamfix_archive}")
+    set(beamfix_FOUND FALSE)
+    set(beamfix_NOT_FOUND_MESSAGE
+        "there is no archive for this processor (BEAMFIX_TARGET is \"${BEAMFIX_TARGET}\"): see ${CMAKE_CURRENT_LIST_DIR}/lib")
+    return()
+endif()
+
+if(NOT TARGET beamfix::beamfix)
+    add_library(beamfix::beamfix STATIC IMPORTED)
+    set_target_properties(beamfix::beamfix PROPERTIES
+        IMPORTED_LOCATION "${_beamfix_archive}"
+        INTERFACE_INCLUDE_DIRECTORIES "${CMAKE_CURRENT_LIST_DIR}/include")
+endif()

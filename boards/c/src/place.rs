@@ -1,0 +1,70 @@
+//! Values made in their place, not on the stack.
+//!
+//! A C task may have 2 KB of stack, and a Rust function that returns a value of 20 KB is given a place for it by its caller; but
+//! Rust's callers first take one on their own stack and copy. So two steps of assembler stand between: they take the place as an
+//! argument and pass it on as what every C ABI here calls the hidden first argument of a function that returns a large struct
+//! (AAPCS 5.4, RISC-V "Procedure Calling Convention", System V AMD64 3.2.3).
+
+use core::{arch::naked_asm, mem::size_of};
+
+use beamfix_core::{
+    Localizer, LocalizerConfig, MapLocalizer, Odometry, OdometryConfig,
+    matching::correlative::Pyramid, scan::PointsConfig,
+};
+
+use crate::task::POINTS;
+
+/// Localization as it lies in the caller's memory.
+pub(crate) type Localization<const N: usize> = MapLocalizer<'static, N, POINTS>;
+
+/// Goes on in another function with the same arguments.
+macro_rules! go_on_in {
+    ($function:expr) => {{
+        #[cfg(target_arch = "arm")]
+        naked_asm!("ldr r3, 1f", "bx r3", ".p2align 2", "1: .word {0}", sym $function);
+        #[cfg(any(target_arch = "riscv32", target_arch = "riscv64"))]
+        naked_asm!("tail {0}", sym $function);
+        #[cfg(target_arch = "x86_64")]
+        naked_asm!("jmp {0}", sym $function);
+    }};
+}
+
+/// Writes odometry to its place.
+///
+/// # Safety
+/// `place` is aligned, has room for it, and is the caller's.
+#[unsafe(naked)]
+pub(crate) unsafe extern "C" fn place_odometry<const N: usize>(
+    place: *mut Odometry<N>,
+    config: &OdometryConfig,
+) {
+    go_on_in!(odometry::<N>)
+}
+
+/// Writes localization to its place.
+///
+/// # Safety
+/// As [`place_odometry`].
+#[unsafe(naked)]
+pub(crate) unsafe extern "C" fn place_localization<const N: usize>(
+    place: *mut Localization<N>,
+    pyramid: &Pyramid<'static>,
+    config: &PointsConfig,
+) {
+    go_on_in!(localization::<N>)
+}
+
+#[allow(improper_ctypes_definitions, reason = "only Rust looks into it")]
+extern "C" fn odometry<const N: usize>(config: &OdometryConfig) -> Odometry<N> {
+    const { assert!(size_of::<Odometry<N>>() > 16, "returned in memory") };
+    Odometry::new(*config)
+}
+
+#[allow(improper_ctypes_definitions, reason = "only Rust looks into it")]
+extern "C" fn localization<const N: usize>(
+    pyramid: &Pyramid<'static>,
+    config: &PointsConfig,
+) -> Localization<N> {
+    const { assert!(size_of::<Localization<N>>() > 16, "returned in memory") };
+    MapLocalizer::new(Localizer::new(*pyramid, LocalizerConfig::DEFAULT), *config)
+}
