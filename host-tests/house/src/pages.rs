@@ -3,8 +3,9 @@
 use std::{fs, path::Path};
 
 /// Pages, and folders of pages.
-const PAGES: [&str; 6] = [
+const PAGES: [&str; 7] = [
     "README.md",
+    "SECURITY.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "boards/README.md",
@@ -45,4 +46,27 @@ fn every_file_that_a_page_names_exists() {
     }
     assert!(named > 40, "the test finds names: {named}");
     assert!(missing.is_empty(), "not there:\n{}", missing.join("\n"));
+}
+
+/// A promise's row names a file of tests and functions in it: `file.rs` `one`, `another`.
+#[test]
+fn every_promise_has_its_test() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let page = fs::read_to_string(root.join("docs/promises.md")).expect("the page of promises");
+    let (mut missing, mut named) = (Vec::new(), 0);
+    for row in page.lines().filter(|line| line.starts_with('|')) {
+        let mut text = String::new();
+        for word in row.split('`').skip(1).step_by(2) {
+            if word.ends_with(".rs") {
+                text = fs::read_to_string(root.join(word)).unwrap_or_default();
+            } else if !text.is_empty() && !word.contains([' ', '#', '!', '-', '/']) {
+                named += 1;
+                if !text.contains(&format!("fn {word}(")) {
+                    missing.push(word.to_owned());
+                }
+            }
+        }
+    }
+    assert!(named > 20, "the test finds names: {named}");
+    assert!(missing.is_empty(), "no such tests: {}", missing.join(", "));
 }
