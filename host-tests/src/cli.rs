@@ -9,6 +9,7 @@ mod lidars;
 mod output;
 mod pairs;
 mod prior;
+mod regress;
 mod replay;
 mod scenes;
 mod simulate;
@@ -36,6 +37,7 @@ struct Tool {
 #[derive(Subcommand)]
 enum Command {
     Simulate(simulate::Args),
+    Regress(regress::Args),
     Replay(replay::Args),
     Pairs(pairs::Args),
     Decode(decode::Args),
@@ -61,6 +63,7 @@ pub fn run() -> ExitCode {
         Some(Command::Field(args)) => field::run(&args),
         Some(Command::Learn(args)) => learn::run(&args),
         Some(Command::Lidars(args)) => lidars::run(&args),
+        Some(Command::Regress(args)) => regress::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Pairs(args)) => pairs::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),

@@ -7,6 +7,7 @@ pub mod golden;
 pub mod learn;
 pub mod matcher;
 pub mod pipeline;
+pub mod regress;
 pub mod report;
 pub mod shared;
 pub mod size;

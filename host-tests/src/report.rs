@@ -2,6 +2,7 @@
 
 pub mod mcap;
 pub mod picture;
+pub mod relations;
 pub mod scene;
 pub mod score;
 pub mod track;

@@ -1,18 +1,13 @@
 //! Odometry over recorded logs, against relations that people checked by hand: `../shared`, where it exists.
 
-use std::path::Path;
-
 use beamfix::geometry::Pose;
 use beamfix::odometry::OdometryConfig;
 use beamfix::scan::Mount;
-use beamfix_sim::TruePose;
 use host_tests::formats::{self, Log};
 use host_tests::pipeline::Pipeline;
-use host_tests::report::score::{self, mean};
+use host_tests::report::relations::{self, Errors, Placed};
+use host_tests::report::score;
 use host_tests::{shared, size, sized};
-
-/// A scan's stamp (s) and where the robot was.
-type Placed = (f64, TruePose);
 
 fn replay<const N: usize>(log: &Log, wheels: bool) -> (Vec<Placed>, u32) {
     let mount = Mount {
@@ -34,43 +29,6 @@ fn track(log: &Log, wheels: bool) -> (Vec<Placed>, u32) {
     sized!(size, replay(log, wheels))
 }
 
-/// Mean errors (m, degrees) over the relations at most 10 s apart: what `tools/relations_eval.py` calls near.
-fn near_errors(mut track: Vec<Placed>, relations: &Path) -> (f64, f64, usize) {
-    track.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let at = |time: f64| {
-        let k = track.partition_point(|placed| placed.0 < time - 5e-4);
-        track
-            .get(k)
-            .filter(|placed| (placed.0 - time).abs() <= 5e-4)
-            .map(|placed| placed.1)
-    };
-    let text = std::fs::read_to_string(relations).expect("the relations");
-    let (mut metres, mut degrees) = (Vec::new(), Vec::new());
-    for line in text
-        .lines()
-        .filter(|line| !line.starts_with('#') && !line.trim().is_empty())
-    {
-        let words: Vec<f64> = line
-            .split_whitespace()
-            .map(|word| word.parse().expect("a number"))
-            .collect();
-        let [from, to, x, y, _, _, _, yaw] = words[..] else {
-            panic!("8 columns: {line}")
-        };
-        if (to - from).abs() > 10.0 {
-            continue;
-        }
-        let (a, b) = (
-            at(from).expect("a scan of that time"),
-            at(to).expect("a scan of that time"),
-        );
-        let off = TruePose::new(x, y, yaw).between(a.between(b));
-        metres.push(off.distance());
-        degrees.push(off.theta.to_degrees().abs());
-    }
-    (mean(&metres), mean(&degrees), metres.len())
-}
-
 #[test]
 fn drift_over_recorded_logs_stays_below_what_was_asked_for() {
     //   log      scans   near relations  allowed (m, degrees) with wheels and without
@@ -89,8 +47,13 @@ fn drift_over_recorded_logs_stays_below_what_was_asked_for() {
         );
         for (wheels, allowed) in [(true, with_wheels), (false, without)] {
             let (track, refused) = track(&log, wheels);
-            let (metres, degrees, used) =
-                near_errors(track, &path.with_file_name(format!("{name}.relations")));
+            // What `tools/relations_eval.py` calls near.
+            let relations_file = path.with_file_name(format!("{name}.relations"));
+            let Errors {
+                metres,
+                degrees,
+                used,
+            } = relations::errors(track, &relations_file, 10.0).expect("the relations");
             println!(
                 "{name}, wheels {wheels}: {used} relations, {metres:.4} m, {degrees:.3}°, {refused} scans refused"
             );

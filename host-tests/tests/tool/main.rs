@@ -5,6 +5,7 @@ mod cli;
 mod common;
 mod fields;
 mod recordings;
+mod regress;
 mod scenes;
 mod tuning;
 mod watch;
