@@ -235,7 +235,7 @@ impl<S: AsRef<[u8]>> Grid<S> {
 
     /// The storage.
     #[must_use]
-    pub fn into_cells(self) -> S {
+    pub(crate) fn into_cells(self) -> S {
         self.cells
     }
 }

@@ -37,7 +37,8 @@
 //! | `sick` | LMS200, LMS291 | the telegram listing and its examples |
 //!
 //! Not supported: Roborock's LDS01RR with the header `E7 7E` (its one description leaves open where the fields lie;
-//! units with the XV-11's frames are [`Model::XIAOMI_LDS02RR`]), LSLIDAR M10 (its fields are not sure), Delta-3A, YDLIDAR R3.
+//! units with the XV-11's frames are [`Model::XIAOMI_LDS02RR`]), LSLIDAR M10 (one driver tells its
+//! layout: frames without a check code, whose missing points change the angles of all others, and no recording to try it on), Delta-3A, YDLIDAR R3.
 //!
 //! Which way the angles of LDS02RR, COIN-D4, "Mystery 360" and MS200 grow, and where the zero of many sensors looks, no source
 //! proves: try it on the unit, and copy the [`Model`] with `counter_clockwise` and `zero_cdeg` as found.

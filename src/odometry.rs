@@ -10,10 +10,12 @@ mod deskew;
 mod keyframes;
 mod motion;
 mod prior;
+mod sparse;
 mod state;
 mod step;
 
 pub use config::OdometryConfig;
+pub use sparse::{SparseConfig, SparseOdometry};
 pub use state::Odometry;
 pub use step::{Counters, Refusal, Step};
 

@@ -24,6 +24,7 @@ pub mod points;
 pub(crate) mod slots;
 pub(crate) mod surface;
 pub(crate) mod thinning;
+pub(crate) mod wide;
 
 pub use assembler::Assembler;
 pub use beam::{Beam, Bearing, NoReturn, Range};
@@ -142,7 +143,7 @@ impl<const N: usize> Scan<N> {
 
     /// Time from the first to the last beam (s).
     #[must_use]
-    pub fn duration(&self) -> f32 {
+    pub(crate) fn duration(&self) -> f32 {
         if self.is_empty() {
             return 0.0;
         }

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use beamfix::geometry::{Point, Pose, Twist};
 use beamfix::lidar::Protocol;
-use beamfix::odometry::{Counters, Odometry, OdometryConfig, Step};
+use beamfix::odometry::{Counters, Odometry, OdometryConfig, SparseConfig, SparseOdometry, Step};
 use beamfix::pipeline::{Estimate, Estimator, Pipeline as Bytes, Revolution, Tracker};
 use beamfix::scan::{Beam, Mount};
 
@@ -11,6 +11,7 @@ use crate::decode::{WithParser, with_parser};
 use crate::formats::capture::{self, Content};
 use crate::formats::{Log, Recorded};
 use crate::report::hash::PoseHash;
+use crate::size;
 
 /// What an estimator may look up between two scans (bytes): a fifth of a second of an M4F at 168 MHz.
 const BUDGET: u32 = 10_000_000;
@@ -22,6 +23,16 @@ pub fn config(mount: Mount, directions: usize) -> OdometryConfig {
         directions: directions as u16,
         ..OdometryConfig::DEFAULT.with_mount(mount)
     }
+}
+
+/// Odometry for a ring of rangers whose beams are so wide (rad).
+#[must_use]
+pub fn sparse_odometry(mount: Mount, beam_width: f32) -> SparseOdometry<{ size::SPARSE }, 32> {
+    SparseOdometry::new(SparseConfig {
+        mount,
+        beam_width,
+        ..SparseConfig::DEFAULT
+    })
 }
 
 /// What came of a log.

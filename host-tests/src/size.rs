@@ -7,6 +7,24 @@ use beamfix::scan::Beam;
 /// Beams a revolution, smallest first.
 pub const SIZES: [usize; 5] = [360, 456, 512, 720, 1024];
 
+/// Most beams of a scan by a ring of rangers.
+pub const SPARSE: usize = 64;
+
+/// Width of a beam (rad) where scans are those of a ring of rangers: few beams, and too far apart for neighbours to show
+/// surfaces.
+#[must_use]
+pub fn beam_width<'a>(mut scans: impl Iterator<Item = &'a [Beam]>) -> Option<f32> {
+    let mut finest = 0;
+    let is_sparse = scans.all(|scan| {
+        if scan.len() > 2 {
+            finest = finest.max(per_revolution(scan));
+        }
+        scan.len() <= SPARSE
+    });
+    // 5.1° apart: a lidar that turns is finer.
+    (is_sparse && (16..=70).contains(&finest)).then(|| core::f32::consts::TAU / finest as f32)
+}
+
 /// The smallest of [`SIZES`] with room for the usual one of these scans, the largest where none has.
 #[must_use]
 pub fn fitting<'a>(scans: impl Iterator<Item = &'a [Beam]>) -> usize {

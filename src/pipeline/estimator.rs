@@ -3,7 +3,7 @@
 use crate::{
     geometry::{EgoMotion, Pose},
     linalg::Covariance,
-    odometry::{Odometry, Step},
+    odometry::{Odometry, SparseOdometry, Step},
     scan::Scan,
 };
 
@@ -48,6 +48,14 @@ pub enum Verdict {
 }
 
 impl<const N: usize> Estimator<N> for Odometry<N> {
+    type Step = Step;
+
+    fn update(&mut self, scan: &Scan<N>, ego: EgoMotion) -> Step {
+        Self::update(self, scan, ego)
+    }
+}
+
+impl<const N: usize, const K: usize> Estimator<N> for SparseOdometry<N, K> {
     type Step = Step;
 
     fn update(&mut self, scan: &Scan<N>, ego: EgoMotion) -> Step {

@@ -73,7 +73,7 @@ impl<S: AsRef<[u8]>> LikelihoodField<S> {
 
     /// The storage.
     #[must_use]
-    pub fn into_cells(self) -> S {
+    pub(crate) fn into_cells(self) -> S {
         self.grid.into_cells()
     }
 }

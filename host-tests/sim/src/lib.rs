@@ -16,6 +16,7 @@ pub mod home;
 pub mod lidar;
 pub mod noise;
 pub mod pose;
+pub mod ring;
 pub mod robot;
 pub mod scene;
 pub mod scenes;

@@ -25,6 +25,13 @@ impl Ranging {
         farthest: 12.0,
     };
 
+    /// What there is, however far.
+    pub const TRUE: Self = Self {
+        sigma: 0.0,
+        nearest: 0.0,
+        farthest: f64::INFINITY,
+    };
+
     /// Range (mm, with noise) from `sensor` in the direction `bearing` (rad, counter-clockwise from its front).
     pub fn measure(
         &self,

@@ -7,18 +7,20 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use beamfix::geometry::Pose;
-use beamfix::odometry::{Counters, Odometry};
+use beamfix::odometry::{Odometry, Refusal, Step};
+use beamfix::pipeline::Estimator;
 use beamfix::scan::Mount;
 use beamfix_sim::encoder;
 use beamfix_sim::lidar::Ranging;
-use beamfix_sim::{Drive, Settings};
-use host_tests::decode::{self, Summary};
+use beamfix_sim::ring::{Ring, RingModel};
+use beamfix_sim::{Drive, Moment, Settings};
+use host_tests::decode;
 use host_tests::formats::bytes::Content;
-use host_tests::formats::capture::log::{self, Revolution};
-use host_tests::formats::capture::simulated;
+use host_tests::formats::capture::{log, simulated};
+use host_tests::formats::carmen;
 use host_tests::formats::ros::bag::ATTACHMENT;
 use host_tests::formats::{Log, ros_map};
-use host_tests::pipeline::{config, follow};
+use host_tests::pipeline::{config, follow, sparse_odometry};
 use host_tests::report::mcap::McapFile;
 use host_tests::report::picture;
 use host_tests::{size, sized};
@@ -31,13 +33,13 @@ use host_tests::report::track::{At, Track};
 /// Drive a simulated robot through a flat: ray casting, lidar bytes, driver, matcher, pose.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Where to write map.png, errors.svg, trajectory.txt, truth.txt, run.mcap, and lidar.rec for `replay`.
+    /// Where to write map.png, errors.svg, trajectory.txt, truth.txt, run.mcap, and lidar.rec or ring.log for `replay`.
     #[arg(long, value_name = "DIR", default_value = "target/beamfix")]
     out: PathBuf,
     /// Seed of all randomness.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// The lidar on board.
+    /// The lidar on board: a name that `lidars` lists, or vl53l5cx-ring, eight rangers of eight zones around the robot.
     #[arg(long, value_name = "MODEL", default_value = "ld06")]
     lidar: String,
     /// Where the guess for each match comes from: the simulated wheels' odometry, or the last velocity.
@@ -63,38 +65,99 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if !(args.seconds > 0.0) {
         bail!("--seconds {}: must be above 0", args.seconds);
     }
-    let model = decode::model(&args.lidar, &[])?;
-    fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     let settings = Settings {
         seed: args.seed,
         seconds: args.seconds,
+        ..Settings::DEFAULT
+    };
+    if args.lidar == RING {
+        fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
+        return ring(args, settings);
+    }
+    let model = decode::model(&args.lidar, &[])?;
+    fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
+    let settings = Settings {
         ranging: Ranging {
             nearest: f64::from(model.min_range_mm) * 1e-3,
             farthest: f64::from(model.max_range_mm) * 1e-3,
             ..Ranging::DEFAULT
         },
-        ..Settings::DEFAULT
+        ..settings
     };
     let drive = beamfix_sim::drive(&settings, encoder::for_model(model).as_mut());
-    if let Some(path) = &args.ros_map {
-        write_map(&drive, path)?;
-    }
     let (bytes, revolutions, summary) = simulated::capture(&drive, settings.mount, model)?;
-    let path = args.out.join("lidar.rec");
+    let path = args.out.join(RECORDING);
     fs::write(&path, &bytes).with_context(|| path.display().to_string())?;
-    if revolutions.is_empty() {
-        bail!(
-            "--seconds {}: not one whole revolution of the lidar",
-            args.seconds
-        );
-    }
-    let content = Content { bytes, cut: None };
-    let log = log::parse("the simulated drive", content, model.name)?;
+    let moment = |revolution| simulated::moment(&drive, revolution);
+    let moments: Option<Vec<Moment>> = revolutions.iter().map(moment).collect();
+    let moments = moments.context("a revolution ends at a beam")?;
     let size = size::fitting(revolutions.iter().map(|revolution| &revolution.beams[..]));
-    sized!(
-        size,
-        replay(args, &settings, drive, &log, &revolutions, &summary)
-    )
+    let log = if moments.is_empty() {
+        Log::default()
+    } else {
+        log::parse(
+            "the simulated drive",
+            Content { bytes, cut: None },
+            model.name,
+        )?
+    };
+    let run = Run {
+        drive,
+        moments,
+        log,
+        packets: summary.packets,
+    };
+    sized!(size, turning(args, &settings, run))
+}
+
+/// The name of the ring of rangers, which has no bytes and so is no model.
+const RING: &str = "vl53l5cx-ring";
+/// What a lidar's drive is recorded in for `replay`, and what a ring's.
+const RECORDING: &str = "lidar.rec";
+const RING_RECORDING: &str = "ring.log";
+
+/// A finished drive, and its scans as the pipeline gets them.
+struct Run {
+    drive: Drive,
+    log: Log,
+    /// The robot at the end of each scan.
+    moments: Vec<Moment>,
+    packets: u32,
+}
+
+/// A lidar that turns, with room for N beams a revolution.
+fn turning<const N: usize>(args: &Args, settings: &Settings, run: Run) -> Result<ExitCode> {
+    let mount = Mount {
+        robot_from_lidar: settings.mount.into(),
+        ..Mount::DEFAULT
+    };
+    let odometry = Odometry::<N>::new(config(mount, N));
+    replay(args, settings, run, odometry, |odometry| {
+        odometry.counters().lost
+    })
+}
+
+/// A ring of rangers, which sees 64 wide beams at once.
+fn ring(args: &Args, settings: Settings) -> Result<ExitCode> {
+    let settings = Settings {
+        ranging: Ranging::TRUE,
+        ..settings
+    };
+    let mut ring = Ring::new(RingModel::VL53L5CX, args.seed);
+    let drive = beamfix_sim::drive(&settings, &mut ring);
+    let log = simulated::ring(&drive, &ring, settings.mount);
+    let moments = ring.scans.iter().map(|scan| drive.moments[scan.0 - 1]);
+    let moments = moments.collect();
+    let path = args.out.join(RING_RECORDING);
+    fs::write(&path, carmen::written(&log)).with_context(|| path.display().to_string())?;
+    let odometry = sparse_odometry(log.mount, RingModel::VL53L5CX.width() as f32);
+    let run = Run {
+        drive,
+        log,
+        moments,
+        packets: 0,
+    };
+    replay(args, &settings, run, odometry, |_| 0)
 }
 
 /// Side of a cell of a written map (m).
@@ -116,50 +179,69 @@ fn write_map(drive: &Drive, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Follows the robot by what its lidar saw, with room for N beams a revolution.
-fn replay<const N: usize>(
+/// Follows the robot by what its lidar saw; `lost` counts the keyframes that were given up.
+fn replay<E: Estimator<N, Step = Step>, const N: usize>(
     args: &Args,
     settings: &Settings,
-    drive: Drive,
-    log: &Log,
-    revolutions: &[Revolution],
-    summary: &Summary,
+    run: Run,
+    estimator: E,
+    lost: impl Fn(&E) -> u32,
 ) -> Result<ExitCode> {
-    let moment =
-        |revolution| simulated::moment(&drive, revolution).context("a revolution ends at a beam");
-    let origin = moment(revolutions.first().context("there is a revolution")?)?;
+    let Run {
+        drive,
+        log,
+        moments,
+        packets,
+    } = run;
+    let Some(&origin) = moments.first() else {
+        bail!(
+            "--seconds {}: not one whole revolution of the lidar",
+            args.seconds
+        );
+    };
+    if let Some(path) = &args.ros_map {
+        write_map(&drive, path)?;
+    }
     let mut mcap = McapFile::create(&args.out.join("run.mcap"), &["estimate", "truth", "wheels"])?;
-    // So that `replay` takes this file too.
-    mcap.attach(ATTACHMENT, &fs::read(args.out.join("lidar.rec"))?)?;
+    let recording = if log.capture.is_some() {
+        // So that `replay` takes this file too.
+        mcap.attach(ATTACHMENT, &fs::read(args.out.join(RECORDING))?)?;
+        RECORDING
+    } else {
+        RING_RECORDING
+    };
     let mut trajectory = output::create(&args.out.join("trajectory.txt"))?;
     let mut truth = output::create(&args.out.join("truth.txt"))?;
     let mut track = Track::new(origin.truth, settings.mount.into(), DRAWN);
-    let bar = output::progress(revolutions.len(), "matching");
-    let mount = Mount {
-        robot_from_lidar: settings.mount.into(),
-        ..Mount::DEFAULT
-    };
-    let odometry = Odometry::<N>::new(config(mount, N));
+    let bar = output::progress(moments.len(), "matching");
     let wheels = args.prior == Prior::Odometry;
-    let mut revolutions = revolutions.iter();
-    let followed = follow(log, (usize::MAX, wheels), odometry, &mut |scan, pose, _| {
-        let now = moment(revolutions.next().context("a revolution for each scan")?)?;
-        let true_pose: Pose = origin.truth.between(now.truth).into();
-        let wheels: Pose = origin.wheels.between(now.wheels).into();
-        let at = At {
-            time: now.time,
-            estimate: pose,
-            truth: Some(true_pose),
-            wheels: Some(wheels),
-        };
-        let points = track.push(at, &scan.beams);
-        mcap.push(now.time, &points, &[pose, true_pose, wheels])?;
-        for (file, pose) in [(&mut trajectory, pose), (&mut truth, true_pose)] {
-            writeln!(file, "{:.6} {} {} {}", now.time, pose.x, pose.y, pose.theta)?;
-        }
-        bar.inc(1);
-        Ok(())
-    })?;
+    let (mut refused, mut keyframes) = (0, 0);
+    let mut at_end = moments.iter();
+    let followed = follow(
+        &log,
+        (usize::MAX, wheels),
+        estimator,
+        &mut |scan, pose, step| {
+            let now = at_end.next().context("a moment for each scan")?;
+            refused += u32::from(!matches!(step.outcome, Ok(_) | Err(Refusal::First)));
+            keyframes += u32::from(step.keyframe);
+            let true_pose: Pose = origin.truth.between(now.truth).into();
+            let wheels: Pose = origin.wheels.between(now.wheels).into();
+            let at = At {
+                time: now.time,
+                estimate: pose,
+                truth: Some(true_pose),
+                wheels: Some(wheels),
+            };
+            let points = track.push(at, &scan.beams);
+            mcap.push(now.time, &points, &[pose, true_pose, wheels])?;
+            for (file, pose) in [(&mut trajectory, pose), (&mut truth, true_pose)] {
+                writeln!(file, "{:.6} {} {} {}", now.time, pose.x, pose.y, pose.theta)?;
+            }
+            bar.inc(1);
+            Ok(())
+        },
+    )?;
     bar.finish_and_clear();
     mcap.finish()?;
     trajectory.flush()?;
@@ -183,12 +265,7 @@ fn replay<const N: usize>(
     picture::save(&map, &args.out.join("map.png"))?;
     picture::save(&track.chart(title), &args.out.join("errors.svg"))?;
 
-    let Counters {
-        scans,
-        refused,
-        keyframes,
-        lost,
-    } = followed.estimator.counters();
+    let (scans, lost) = (followed.scans, lost(&followed.estimator));
     let value = json!({
         "lidar": args.lidar, "seed": args.seed,
         "final_error_m": errors.last.0, "final_error_deg": errors.last.1,
@@ -196,15 +273,15 @@ fn replay<const N: usize>(
         "wheels_error_m": errors.wheels.0, "wheels_error_deg": errors.wheels.1,
         "distance_m": drive.distance, "seconds": seconds, "scans": scans,
         "refused": refused, "keyframes": keyframes, "lost": lost, "refused_beams": followed.refused_beams,
-        "bytes": drive.bytes.len(), "packets": summary.packets, "pose_hash": followed.hash.to_string(),
+        "bytes": drive.bytes.len(), "packets": packets, "pose_hash": followed.hash.to_string(),
     });
     let text = format!(
         "{caption}\nwheels alone: {:.1} cm, {:.2}° at the end\n{} bytes, {} packets, {} scans, {} refused, {} keyframes\n\
-         pose hash {}\nwritten to {}: map.png errors.svg trajectory.txt truth.txt run.mcap lidar.rec",
+         pose hash {}\nwritten to {}: map.png errors.svg trajectory.txt truth.txt run.mcap {recording}",
         100.0 * errors.wheels.0,
         errors.wheels.1,
         drive.bytes.len(),
-        summary.packets,
+        packets,
         scans,
         refused,
         keyframes,

@@ -63,7 +63,7 @@ fn field() -> LikelihoodField<Vec<u8>> {
 fn lowered(field: LikelihoodField<Vec<u8>>, x: i32, y: i32) -> LikelihoodField<Vec<u8>> {
     use beamfix::{grid::Grid, sensor_model::likelihood_field::Field};
     let (shape, scale) = (*field.grid().shape(), *field.as_slice().scale());
-    let mut cells = field.into_cells();
+    let mut cells = field.grid().cells().to_vec();
     cells[shape.index(x, y).expect("on the grid")] = 1;
     LikelihoodField::new(Grid::new(shape, cells).expect("fits"), scale).expect("small")
 }

@@ -7,3 +7,4 @@ mod interrupted;
 mod pipeline;
 mod replay;
 mod simulate;
+mod sparse;

@@ -51,12 +51,6 @@ impl FieldModel {
         })
     }
 
-    /// Spread of hits (m).
-    #[must_use]
-    pub const fn sigma(&self) -> f32 {
-        self.sigma
-    }
-
     /// Logarithm of the density `distance` metres from the nearest surface (nat, densities per metre).
     #[must_use]
     pub fn log_likelihood(&self, distance: f32) -> f32 {
@@ -105,12 +99,6 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Log-likelihood (nat) of a byte.
-    #[must_use]
-    pub fn nats(&self, byte: u8) -> f32 {
-        self.floor + self.step * (f32::from(byte) - 1.0)
-    }
-
     /// Byte of a cell `sigmas` standard deviations from a surface.
     pub(crate) fn byte_at(&self, sigmas: f32) -> u8 {
         let steps = 0.5 * sigmas * sigmas / self.step;

@@ -2,13 +2,14 @@
 
 use anyhow::Result;
 use beamfix::geometry::Pose;
-use beamfix::odometry::{Counters, Odometry, Refusal};
+use beamfix::odometry::{Odometry, Refusal, Step};
+use beamfix::pipeline::Estimator;
 use beamfix_sim::TruePose;
 use host_tests::formats::Log;
-use host_tests::pipeline::{Followed, config, follow};
+use host_tests::pipeline::{Followed, config, follow, sparse_odometry};
 use host_tests::report::picture;
 use host_tests::report::track::{At, Track};
-use host_tests::sized;
+use host_tests::{size, sized};
 use serde_json::json;
 
 use super::args::{Args, DRAWN};
@@ -17,11 +18,23 @@ use crate::cli::output;
 
 /// Replays the log with room for `size` beams a revolution and so many directions, and reports.
 pub fn run(args: &Args, log: &Log, (size, directions): (usize, usize)) -> Result<Done> {
-    let outcome = sized!(size, replay(args, log, directions))?;
-    let (counters, measured) = outcome.estimator;
-    let Counters {
-        keyframes, lost, ..
-    } = counters;
+    let width = size::beam_width(log.scans.iter().map(|scan| &scan.beams[..]));
+    let outcome = match width {
+        Some(width) => {
+            output::remark(&[format!(
+                "beams {:.1}° apart are a ring of rangers: the last 32 scans together are what the next one is matched against",
+                width.to_degrees()
+            )]);
+            let odometry = sparse_odometry(args.mount_of(log), width);
+            replay(args, log, odometry, |_| 0)
+        }
+        None => sized!(size, turning(args, log, directions)),
+    }?;
+    let Counted {
+        keyframes,
+        lost,
+        measured,
+    } = outcome.estimator;
     let scans = outcome.scans;
     // A scan before the first reference has no pose of its own either.
     let refused = scans - measured;
@@ -53,13 +66,29 @@ pub fn run(args: &Args, log: &Log, (size, directions): (usize, usize)) -> Result
     })
 }
 
-/// The counters, and how many poses are measured.
-type Counted = (Counters, usize);
+/// Keyframes made and given up, and how many poses are measured.
+struct Counted {
+    keyframes: u32,
+    lost: u32,
+    measured: usize,
+}
 
-fn replay<const N: usize>(args: &Args, log: &Log, directions: usize) -> Result<Followed<Counted>> {
+/// A lidar that turns, with room for N beams a revolution and so many directions.
+fn turning<const N: usize>(args: &Args, log: &Log, directions: usize) -> Result<Followed<Counted>> {
+    let odometry = Odometry::<N>::new(config(args.mount_of(log), directions));
+    replay(args, log, odometry, |odometry| odometry.counters().lost)
+}
+
+/// Replays with an estimator; `lost` counts the keyframes that it has given up.
+fn replay<E: Estimator<N, Step = Step>, const N: usize>(
+    args: &Args,
+    log: &Log,
+    estimator: E,
+    lost: impl Fn(&E) -> u32,
+) -> Result<Followed<Counted>> {
     let mount = args.mount_of(log);
     let mut trajectory = args.open_trajectory()?;
-    let mut measured = 0;
+    let (mut measured, mut keyframes) = (0, 0);
     let count = args.count(log.scans.len());
     let bar = output::progress(count, "replaying");
     let mut track = Track::new(
@@ -68,12 +97,12 @@ fn replay<const N: usize>(args: &Args, log: &Log, directions: usize) -> Result<F
         (count / DRAWN).max(1),
     );
     let start = log.scans.iter().find_map(|scan| scan.wheels);
-    let odometry = Odometry::<N>::new(config(mount, directions));
     let ego = (count, args.uses_wheels());
-    let followed = follow(log, ego, odometry, &mut |scan, pose, step| {
+    let followed = follow(log, ego, estimator, &mut |scan, pose, step| {
         let is_first = step.keyframe && step.outcome == Err(Refusal::First);
         let is_measured = step.outcome.is_ok() || is_first;
         measured += usize::from(is_measured);
+        keyframes += u32::from(step.keyframe);
         if let Some(file) = &mut trajectory {
             file.push(&scan.stamp, pose, !is_measured)?;
         }
@@ -105,5 +134,9 @@ fn replay<const N: usize>(args: &Args, log: &Log, directions: usize) -> Result<F
     if let Some(file) = trajectory {
         file.finish()?;
     }
-    Ok(followed.map(|odometry| (odometry.counters(), measured)))
+    Ok(followed.map(|estimator| Counted {
+        keyframes,
+        lost: lost(&estimator),
+        measured,
+    }))
 }

@@ -2,11 +2,14 @@
 
 use anyhow::Result;
 use beamfix::lidar::Model;
+use beamfix::scan::{Beam, Mount};
+use beamfix_sim::ring::Ring;
 use beamfix_sim::{Drive, Moment, TruePose};
 
 use super::log::{self, Revolution};
 use super::{Content, Recorder};
 use crate::decode::Summary;
+use crate::formats::{Log, Recorded};
 
 /// Pieces before the first bytes.
 const HEAD: usize = 2;
@@ -42,6 +45,27 @@ pub fn capture(
     };
     let (revolutions, summary) = log::revolutions(model.name, &write(&[])?)?;
     Ok((write(&revolutions)?, revolutions, summary))
+}
+
+/// The log of a drive with a ring of rangers at `mount`, which has no bytes: its scans, and the wheels at each.
+#[must_use]
+pub fn ring(drive: &Drive, ring: &Ring, mount: TruePose) -> Log {
+    let scan = |(looks, beams): &(usize, Vec<Beam>)| {
+        let now = drive.moments[looks - 1];
+        Recorded {
+            stamp: format!("{:.6}", now.time),
+            wheels: Some(now.wheels.into()),
+            beams: beams.clone(),
+        }
+    };
+    Log {
+        scans: ring.scans.iter().map(scan).collect(),
+        mount: Mount {
+            robot_from_lidar: mount.into(),
+            ..Mount::DEFAULT
+        },
+        ..Log::default()
+    }
 }
 
 /// The robot at a revolution's last beam.
