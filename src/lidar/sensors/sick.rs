@@ -20,7 +20,7 @@ use crate::lidar::wire::layout::{Context, Fan, Layout, Plain};
 use crate::lidar::wire::packet::{self, Reading, View};
 use crate::lidar::wire::parser;
 use crate::lidar::wire::request::{MAX_BYTES, Request};
-use crate::scan::NoReturn;
+use crate::scan::{Beam, NoReturn};
 
 impl Model {
     /// SICK LMS200, LMS291: 9600 baud after power-on; only 500 000 carries every scan.
@@ -65,6 +65,9 @@ pub const HALF_DEGREES: [u8; 5] = [0x3b, 0xb4, 0x00, 0x32, 0x00];
 /// Payload that chooses 180° in steps of 1°.
 pub const WHOLE_DEGREES: [u8; 5] = [0x3b, 0xb4, 0x00, 0x64, 0x00];
 
+/// Time in which the mirror turns by a degree (µs/256): 13.3 ms a revolution.
+const DEGREE_Q8: u32 = 3_413_333 / 360;
+
 /// Push parser. About 950 bytes; a packet has 850.
 pub type Parser = parser::Parser<Plain<Telegrams>, FRAME>;
 
@@ -89,6 +92,7 @@ impl Layout for Telegrams {
             return Some(Packet {
                 answer,
                 unit_q2: 0,
+                revolutions: 1,
                 view: context.base,
                 fan: Fan::new(0, 0, 2, &[])?,
             });
@@ -111,8 +115,6 @@ impl Layout for Telegrams {
         };
         let first = from_cdeg(start_cdeg + 25 * u32::from(partial));
         let fan = Fan::new(first, from_cdeg(step_cdeg), 2, values)?;
-        // The mirror takes 13.3 ms a revolution; half degrees take two, quarter degrees four.
-        const DEGREE_Q8: u32 = 3_413_333 / 360;
         let revolutions = 100 / step_cdeg as u16;
         let first_us = context
             .pace
@@ -120,6 +122,7 @@ impl Layout for Telegrams {
         Some(Packet {
             answer,
             unit_q2: if header >> 14 == 1 { 4 } else { 40 },
+            revolutions,
             view: View {
                 first_us,
                 period_q8: DEGREE_Q8 / u32::from(revolutions),
@@ -180,6 +183,8 @@ pub struct Packet {
     /// What it is: `0xB0` measurements.
     pub answer: u8,
     unit_q2: u8,
+    /// Turns of the mirror that the measurements took.
+    revolutions: u16,
     view: View,
     fan: Fan<{ 2 * MAX_VALUES }>,
 }
@@ -187,6 +192,21 @@ pub struct Packet {
 impl packet::Packet for Packet {
     fn view(&self) -> &View {
         &self.view
+    }
+
+    /// A revolution of the mirror takes a measurement a degree: of half degrees the odd ones are those of a second revolution,
+    /// 13.3 ms after the even ones, of quarter degrees every fourth is one revolution's.
+    fn beams(&self) -> impl Iterator<Item = Beam> + '_ {
+        let (passes, first_us) = (u32::from(self.revolutions.max(1)), self.view.first_us);
+        let beams = packet::beams(self.view, self.readings());
+        (0u32..).zip(beams).map(move |(k, beam)| {
+            let (pass, degree) = (k % passes, k / passes);
+            let age_q8 = pass * 360 * DEGREE_Q8 + degree * DEGREE_Q8;
+            Beam {
+                time_us: first_us.wrapping_add(age_q8 >> 8),
+                ..beam
+            }
+        })
     }
 
     fn readings(&self) -> impl Iterator<Item = Reading> + '_ {
@@ -203,5 +223,43 @@ impl packet::Packet for Packet {
             };
             (range, 0)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lidar::Protocol as _;
+    use crate::lidar::wire::packet::Packet as _;
+
+    #[test]
+    fn interleaved_measurements_have_the_times_of_their_revolutions() {
+        // count, in steps of (0.01°), revolutions of the mirror
+        for (count, revolutions) in [(181u16, 1u32), (361, 2), (401, 4)] {
+            let mut frame = heapless::Vec::<u8, FRAME>::new();
+            let length = 4 + 2 * count;
+            let head = [0x02, 0x80, length as u8, (length >> 8) as u8, 0xb0];
+            frame.extend_from_slice(&head).expect("room");
+            let header = (0x4000 | count).to_le_bytes();
+            frame.extend_from_slice(&header).expect("room");
+            for _ in 0..count {
+                frame.extend_from_slice(&[0xe8, 0x03]).expect("room");
+            }
+            frame.push(0x10).expect("room");
+            let code = check_code(&frame).to_le_bytes();
+            frame.extend_from_slice(&code).expect("room");
+            let mut parser = Parser::for_model(&Model::SICK_LMS200);
+            let packet = frame.iter().find_map(|&byte| parser.push(byte));
+            let packet = packet.expect("a whole telegram");
+            let first_us = packet.view().first_us;
+            for (k, beam) in (0u32..).zip(packet.beams()) {
+                let (pass, degree) = (k % revolutions, k / revolutions);
+                let wanted = f64::from(pass) * 13_333.3 + f64::from(degree) * 37.037;
+                let age = f64::from(beam.time_us.wrapping_sub(first_us));
+                // The degree's time is cut to 1/256 µs.
+                assert!((age - wanted).abs() < 4.0, "{count}: {k}: {age} {wanted}");
+            }
+            assert_eq!(packet.beams().count(), usize::from(count));
+        }
     }
 }

@@ -95,31 +95,10 @@ pub trait Packet {
     /// As they stand in the frame, in the order of measurement.
     fn readings(&self) -> impl Iterator<Item = Reading> + '_;
 
-    /// In the order of measurement; angles counter-clockwise from forward, times in the parser's clock.
+    /// In the order of the frame, which is that of measurement unless a mirror takes every other one in its next turn; angles
+    /// counter-clockwise from forward, times in the parser's clock.
     fn beams(&self) -> impl Iterator<Item = Beam> + '_ {
-        let view = *self.view();
-        let mut age_q8 = 0u32;
-        self.readings().map(move |reading| {
-            let turned = reading.angle.wrapping_sub(view.zero);
-            let angle = if view.counter_clockwise {
-                turned
-            } else {
-                turned.wrapping_neg()
-            };
-            let quality = reading.quality >> view.quality_shift;
-            let beam = Beam {
-                bearing: Bearing((angle.wrapping_add(0x8000) >> 16) as u16),
-                range: match reading.range {
-                    _ if view.doubtful => Range::none(NoReturn::Doubtful),
-                    Ok(quarters) => Range::from_mm(quarters.saturating_add(2) >> 2),
-                    Err(reason) => Range::none(reason),
-                },
-                time_us: view.first_us.wrapping_add(age_q8 >> 8),
-                quality: if quality > 255 { 255 } else { quality as u8 },
-            };
-            age_q8 = age_q8.wrapping_add(view.period_q8);
-            beam
-        })
+        beams(*self.view(), self.readings())
     }
 
     /// As the sensor itself gives them, in the same order: where a maker corrects the angle on the host only, before that.
@@ -136,4 +115,33 @@ pub trait Packet {
     fn revolution_start(&self) -> Option<usize> {
         self.view().revolution_start.map(usize::from)
     }
+}
+
+/// Beams of readings that follow each other at an even pace.
+pub(crate) fn beams(
+    view: View,
+    readings: impl Iterator<Item = Reading>,
+) -> impl Iterator<Item = Beam> {
+    let mut age_q8 = 0u32;
+    readings.map(move |reading| {
+        let turned = reading.angle.wrapping_sub(view.zero);
+        let angle = if view.counter_clockwise {
+            turned
+        } else {
+            turned.wrapping_neg()
+        };
+        let quality = reading.quality >> view.quality_shift;
+        let beam = Beam {
+            bearing: Bearing((angle.wrapping_add(0x8000) >> 16) as u16),
+            range: match reading.range {
+                _ if view.doubtful => Range::none(NoReturn::Doubtful),
+                Ok(quarters) => Range::from_mm(quarters.saturating_add(2) >> 2),
+                Err(reason) => Range::none(reason),
+            },
+            time_us: view.first_us.wrapping_add(age_q8 >> 8),
+            quality: if quality > 255 { 255 } else { quality as u8 },
+        };
+        age_q8 = age_q8.wrapping_add(view.period_q8);
+        beam
+    })
 }
