@@ -237,19 +237,23 @@ fn draw<C: Canvas + ?Sized>(
     let half = math::round_to_i32(4.0 * piece.half);
     let quarter_mm =
         |cell: i32, middle: f32| math::round_to_i32((cell as f32 + 0.5 - middle) * cell_mm * 4.0);
-    let clip = |cell: i32, side: u16| cell.max(0).min(i32::from(side) - 1);
-    let first_x = clip(math::round_to_i32(mx - rx - 0.5), shape.width());
-    let last_x = clip(math::round_to_i32(mx + rx - 0.5), shape.width());
-    let first_y = clip(math::round_to_i32(my - ry - 0.5), shape.height());
-    let last_y = clip(math::round_to_i32(my + ry - 0.5), shape.height());
+    // Off the canvas there is nothing to raise: these end before they begin.
+    let first = |middle: f32, reach: f32| math::round_to_i32(middle - reach - 0.5).max(0);
+    let last = |middle: f32, reach: f32, side: u16| {
+        math::round_to_i32(middle + reach - 0.5).min(i32::from(side) - 1)
+    };
+    let (first_x, last_x) = (first(mx, rx), last(mx, rx, shape.width()));
+    let (first_y, last_y) = (first(my, ry), last(my, ry, shape.height()));
+    // Farther than any reach, and its square fits twice.
+    let farthest = 40_000;
     for y in first_y..=last_y {
         let dy = quarter_mm(y, my);
         for x in first_x..=last_x {
             let dx = quarter_mm(x, mx);
             let across = (tx.wrapping_mul(dy) - ty.wrapping_mul(dx)) >> 12;
             let on = ((tx.wrapping_mul(dx) + ty.wrapping_mul(dy)) >> 12).abs() - half;
-            let beyond = if on > 0 { on } else { 0 };
-            let square = (across * across + beyond * beyond) as u32 >> 4;
+            let (off, beyond) = (across.abs().min(farthest), on.clamp(0, farthest));
+            let square = ((off * off) as u32 + (beyond * beyond) as u32) >> 4;
             let byte = profile.byte(square);
             if byte > profile.scale().unexplored {
                 canvas.raise(x, y, byte);
@@ -261,7 +265,45 @@ fn draw<C: Canvas + ?Sized>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan::Bearing;
+    use crate::{scan::Bearing, sensor_model::likelihood_field::FieldModel};
+
+    /// Counts the cells that are raised.
+    struct Counted(Shape, u32);
+
+    impl Canvas for Counted {
+        fn shape(&self) -> &Shape {
+            &self.0
+        }
+
+        fn raise(&mut self, _: i32, _: i32, _: u8) {
+            self.1 += 1;
+        }
+    }
+
+    #[test]
+    fn ends_off_the_canvas_raise_nothing_however_far_and_long_the_pieces() {
+        let shape = Shape::new(40, 40, 0.05, Pose::IDENTITY).expect("small");
+        let profile = Profile::new(&FieldModel::DEFAULT);
+        // Beams 0.1° and 10° apart, 0.4 m to 32 m long: pieces of 1 mm to some metres.
+        for (step, range) in [(18u16, 400u16), (18, 32_000), (1820, 4000), (1820, 32_000)] {
+            let points: heapless::Vec<ScanPoint, 16> = (0..16u16)
+                .map(|k| ScanPoint::at(Bearing(k * step), range))
+                .collect();
+            for metres in [1.0f32, 5.0, 11.0, 12.0, 20.0, 40.0, 90.0] {
+                for heading in [0.0, 0.7, 2.0, 3.1, -1.5] {
+                    // The whole fan lies beyond the left edge, farther than a piece and the field around it reach.
+                    let away = -metres - 33.0 - 8.0;
+                    let mut canvas = Counted(shape, 0);
+                    let pose = Pose::new(away, 1.0, heading);
+                    scan(&mut canvas, &points, pose, &profile, &DrawConfig::DEFAULT);
+                    assert_eq!(canvas.1, 0, "{step} {range} {metres} {heading}");
+                    let near = Pose::new(1.0, 1.0, heading);
+                    scan(&mut canvas, &points, near, &profile, &DrawConfig::DEFAULT);
+                    assert!(range > 400 || canvas.1 > 0, "{step} {range} {heading}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn pieces_lie_on_their_wall_and_end_at_a_jump() {
