@@ -46,6 +46,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         "--out {}: the table's own file, neither a map nor what is written beside it, e.g. flat.field",
         args.out.display()
     );
+    let code = args.out.with_extension("rs");
+    let picture = args.out.with_extension("png");
+    output::spare(
+        &[&args.map],
+        &[Some(&args.out), Some(&code), Some(&picture)],
+    )?;
     let mut remarks = Vec::new();
     let map = ros_map::read_remarking(&args.map, &mut remarks)?;
     output::remark(&remarks);
@@ -67,9 +73,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     file.write_all(field.grid().cells())?;
     file.flush()
         .with_context(|| args.out.display().to_string())?;
-    let code = args.out.with_extension("rs");
     write_const(&header, field.grid().cells(), &code)?;
-    let picture = args.out.with_extension("png");
     heat_map(&field, &picture)?;
     let count = |cell: Cell| {
         map.cells()

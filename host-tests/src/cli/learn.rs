@@ -49,6 +49,19 @@ pub struct Args {
 
 /// Learns and reports.
 pub fn run(args: &Args) -> Result<ExitCode> {
+    let map = args.map.as_deref().unwrap_or(&args.log);
+    let picture_of_map = args
+        .keep_map
+        .as_ref()
+        .map(|path| path.with_extension("pgm"));
+    output::spare(
+        &[&args.log, map],
+        &[
+            Some(&args.picture),
+            args.keep_map.as_deref(),
+            picture_of_map.as_deref(),
+        ],
+    )?;
     picture::Kind::of(&args.picture).context("--picture")?;
     let log = formats::read(&args.log)?;
     let ranges = log

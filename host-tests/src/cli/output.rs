@@ -2,9 +2,10 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
+use host_tests::formats::ros_map;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
 
@@ -46,16 +47,27 @@ pub fn remark(remarks: &[String]) {
     }
 }
 
-/// Refuses to write over a file that is read.
+/// Refuses to write over what is read: a file, any file of a folder, a map's picture.
 pub fn spare(read: &[&Path], written: &[Option<&Path>]) -> Result<()> {
-    for output in written.iter().flatten() {
-        for input in read {
-            ensure!(
-                !is_same(input, output),
-                "{}: it is read, and would be overwritten",
-                output.display()
-            );
+    let mut inputs: Vec<PathBuf> = Vec::new();
+    for input in read {
+        let is_map = input
+            .extension()
+            .is_some_and(|ending| ["yaml", "yml"].iter().any(|yaml| ending == *yaml));
+        if let Ok(folder) = input.read_dir() {
+            inputs.extend(folder.flatten().map(|entry| entry.path()));
+        } else if is_map {
+            inputs.extend(ros_map::files(input));
+        } else {
+            inputs.push(input.to_path_buf());
         }
+    }
+    for output in written.iter().flatten() {
+        ensure!(
+            !inputs.iter().any(|input| is_same(input, output)),
+            "{}: it is read, and would be overwritten",
+            output.display()
+        );
     }
     Ok(())
 }

@@ -50,6 +50,7 @@ enum Mode {
 
 /// Matches the pairs.
 pub fn run(args: &Args) -> Result<ExitCode> {
+    output::spare(&[&args.scans, &args.pairs], &[args.out.as_deref()])?;
     let list = pairs::read(&args.scans, &args.pairs)?;
     let config = IcpConfig {
         search: match args.mode {

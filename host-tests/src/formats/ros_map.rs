@@ -31,6 +31,17 @@ pub fn read(yaml: &Path) -> Result<Map> {
     read_remarking(yaml, &mut Vec::new())
 }
 
+/// The files that a map is read from: the YAML file, and the picture that it names.
+#[must_use]
+pub fn files(yaml: &Path) -> Vec<PathBuf> {
+    let mut files = vec![yaml.to_owned()];
+    // What is no map is said when it is read.
+    if let Ok(header) = Header::read(yaml) {
+        files.push(yaml.parent().unwrap_or(Path::new("")).join(&header.image));
+    }
+    files
+}
+
 /// [`read`], with remarks of one line each about what is odd.
 pub fn read_remarking(yaml: &Path, remarks: &mut Vec<String>) -> Result<Map> {
     let name = || yaml.display().to_string();

@@ -90,17 +90,17 @@ fn a_board_is_drawn_and_its_recording_replays_to_the_same_bits() {
     assert_eq!(replayed["pose_hash"], watched["pose_hash"]);
 }
 
-#[test]
-fn frames_of_a_file_are_drawn_and_recorded_to_the_byte() {
-    let folder = folder("watch-file");
+/// The bytes of a lidar in a drive of so many seconds, and what a board sends that gets them.
+fn sent_in(seconds: f64) -> (Vec<u8>, Vec<u8>) {
     let settings = Settings {
-        seconds: 3.0,
+        seconds,
         ..Settings::DEFAULT
     };
     let bytes = drive(&settings, &mut Sensor::ld06()).bytes;
     let config = AppConfig {
         record: true,
         scans: true,
+        quality: true,
         ..CONFIG
     };
     let mut app = Box::new(App::<{ beamfix_app::BEAMS }>::new(config));
@@ -110,6 +110,53 @@ fn frames_of_a_file_are_drawn_and_recorded_to_the_byte() {
         app.set_time((k as u32 * 57).wrapping_sub(1_000_000));
         app.lidar_all(&[byte], |out| sent.extend_from_slice(out));
     }
+    (bytes, sent)
+}
+
+/// Whoever ends it by Ctrl-C has what came until then.
+#[cfg(unix)]
+#[test]
+fn what_came_before_an_interrupt_is_kept() {
+    use std::io::Write;
+    use std::process::{Command, Stdio};
+    use std::time::{Duration, Instant};
+    let folder = folder("watch-interrupt");
+    let (qualities, recording) = (folder.join("qualities.csv"), folder.join("lidar.rec"));
+    let _ = (fs::remove_file(&qualities), fs::remove_file(&recording));
+    let (_, sent) = sent_in(3.0);
+    let mut watch = Command::new(env!("CARGO_BIN_EXE_beamfix"))
+        .args(["watch", "-", "--out", text(&folder.join("live.png"))])
+        .args(["--quality", text(&qualities), "--record", text(&recording)])
+        .stdin(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the tool");
+    // The line stays open: nothing tells the tool that this was all.
+    let mut line = watch.stdin.take().expect("a pipe");
+    line.write_all(&sent).expect("the tool reads");
+    line.flush().expect("the tool reads");
+    let lines = || fs::read_to_string(&qualities).map_or(0, |text| text.lines().count());
+    let given_up = Instant::now() + Duration::from_secs(60);
+    // A head and 28 revolutions, of which the last may be in the pipe.
+    while lines() < 20 && Instant::now() < given_up {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let interrupt = Command::new("kill")
+        .args(["-INT", &watch.id().to_string()])
+        .status();
+    assert!(interrupt.expect("kill").success());
+    assert!(!watch.wait().expect("ended").success());
+    drop(line);
+    assert!(lines() >= 20, "{} lines", lines());
+    let file = fs::read(&recording).expect("a recording");
+    let kept = host_tests::formats::capture::plain(&file).len();
+    assert!(kept > 20 * 450 / 12 * 47, "{kept} bytes of the lidar");
+}
+
+#[test]
+fn frames_of_a_file_are_drawn_and_recorded_to_the_byte() {
+    let folder = folder("watch-file");
+    let (bytes, sent) = sent_in(3.0);
     let frames = folder.join("frames.bin");
     fs::write(&frames, &sent).expect("the test's file");
     let (picture, recording) = (folder.join("live.png"), folder.join("lidar.rec"));
