@@ -33,6 +33,7 @@ use crate::{
         correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid},
         field,
     },
+    math,
     scan::{ScanPoint, thinning::thinned},
 };
 pub use config::LocalizerConfig;
@@ -263,10 +264,13 @@ impl<'a, const N: usize> Localizer<'a, N> {
         Verdict::Doubtful(best.map_or(Quality::NONE, |(_, quality)| quality))
     }
 
-    /// Whether a scan that fits leaves no doubts.
+    /// Whether a scan that fits leaves no doubts. The fewer beams agree, because people end the others, the fewer may have
+    /// crossed a wall.
     fn is_sure(&self, quality: &Quality) -> bool {
-        quality.value() >= self.config.confident_quality
-            && quality.through_share() <= self.config.max_wall_crossings
+        let value = quality.value();
+        let agreeing = math::min(2.0 * value, 1.0);
+        value >= self.config.confident_quality
+            && quality.through_share() <= self.config.max_wall_crossings * agreeing * agreeing
     }
 
     fn update_lost(&mut self, points: &[ScanPoint]) -> Verdict {
@@ -285,7 +289,7 @@ impl<'a, const N: usize> Localizer<'a, N> {
         self.hypotheses.weigh(|pose| {
             let found = field::align(&field, &some, pose, &short);
             let pose = found.map_or(pose, |found| found.pose);
-            (pose, Quality::of(&field, &some, pose, N).value())
+            (pose, Quality::of(&field, &some, pose, N).strict_value())
         });
         let Some(best) = self.hypotheses.best() else {
             self.state = State::Lost;

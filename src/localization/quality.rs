@@ -12,7 +12,8 @@ const LEAP: i32 = 6;
 
 /// What became of a scan's beams.
 ///
-/// People and things that moved end beams early, and count as nothing. A beam that went through a wall counts against.
+/// People and things that moved end beams early, and count as nothing. A beam that went through a wall counts against; one
+/// that ends where the map is unexplored says nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Quality {
@@ -22,6 +23,8 @@ pub struct Quality {
     pub on_surface: u16,
     /// Those that passed a surface before they ended.
     pub through: u16,
+    /// Those that passed none and end where the map is unexplored.
+    pub unexplored: u16,
 }
 
 impl Quality {
@@ -30,6 +33,7 @@ impl Quality {
         beams: 0,
         on_surface: 0,
         through: 0,
+        unexplored: 0,
     };
 
     /// Looks at no more than `most` of the points, each at its end and every 0.15 m on the way, near surfaces every 2.5 cm.
@@ -54,7 +58,8 @@ impl Quality {
         for point in thinned(points, most) {
             quality.beams += 1;
             let (x, y) = placement.cell(point);
-            if field.byte(x, y) >= near {
+            let end = field.byte(x, y);
+            if end >= near {
                 quality.on_surface += 1;
             }
             // The last 0.4 m may graze what the beam ends on.
@@ -76,17 +81,30 @@ impl Quality {
                     near.into_iter().any(|step| touches(step, surface))
                 });
             quality.through += u16::from(passed);
+            quality.unexplored += u16::from(!passed && end == field.scale().unexplored);
         }
         quality
     }
 
-    /// Share of beams that end on a surface less that of beams that passed one: at most 1.
+    /// Share of the beams that end in what the map knows which end on a surface, less that of those that passed one: at most
+    /// 1. Of all beams a third counts in any case: a pose that looks out of the map has no evidence.
     #[must_use]
     pub fn value(&self) -> f32 {
-        if self.beams == 0 {
+        let known = self.beams.saturating_sub(self.unexplored);
+        self.share_of(known.max(self.beams / 3))
+    }
+
+    /// The same as a share of all beams: for poses of which most are wrong, some of which look out of the map.
+    #[must_use]
+    pub fn strict_value(&self) -> f32 {
+        self.share_of(self.beams)
+    }
+
+    fn share_of(&self, beams: u16) -> f32 {
+        if beams == 0 {
             return 0.0;
         }
-        (f32::from(self.on_surface) - f32::from(self.through)) / f32::from(self.beams)
+        (f32::from(self.on_surface) - f32::from(self.through)) / f32::from(beams)
     }
 
     /// Share of beams that passed a surface among those that nothing ended early: people change nothing in it.

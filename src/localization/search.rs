@@ -235,7 +235,7 @@ impl<const N: usize> Search<N> {
             Ok(fine) if alike(fine.pose, best, 0.3, 0.1) => fine.pose,
             _ => best,
         };
-        let quality = Quality::of(pyramid.field(), &self.points, pose, N).value();
+        let quality = Quality::of(pyramid.field(), &self.points, pose, N).strict_value();
         let one = Hypothesis {
             pose,
             sum: quality,

@@ -644,8 +644,34 @@ fn what_is_read_is_never_written_over() {
     fs::write(&capture, drive_bytes()).expect("written");
     fs::hard_link(&log, &linked).expect("a link");
     let (log, linked, bin) = (text(&log), text(&linked), text(&capture));
+    let bag = dir.join("bag");
+    fs::create_dir_all(&bag).expect("a folder");
+    fs::write(bag.join("x.mcap"), &content).expect("written");
+    let inside = bag.join("x.mcap");
+    // A map whose picture has the name that the heat map of `field` would get.
+    let map = dir.join("m.yaml");
+    let yaml = "image: m.png\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
+    fs::write(&map, yaml).expect("written");
+    fs::write(dir.join("m.png"), "a picture").expect("written");
+    let (table, picture) = (dir.join("m.field"), dir.join("m.png"));
+    let (map, table, picture) = (text(&map), text(&table), text(&picture));
     for arguments in [
         &["replay", log, "--trajectory", log] as &[&str],
+        &["replay", text(&bag), "--trajectory", text(&inside)],
+        &[
+            "replay",
+            log,
+            "--mode",
+            "localize",
+            "--map",
+            map,
+            "--picture",
+            picture,
+        ],
+        &["field", map, "--out", table],
+        &["pairs", log, bin, "--out", bin],
+        &["learn", log, "--picture", log],
+        &["learn", log, "--keep-map", log],
         &["replay", log, "--trajectory", linked],
         &["decode", "--lidar", "ld06", bin, "--csv", bin],
         &["watch", bin, "--record", bin],
@@ -660,6 +686,8 @@ fn what_is_read_is_never_written_over() {
         );
     }
     assert_eq!(fs::read(log).expect("still there"), content);
+    assert_eq!(fs::read(inside).expect("still there"), content);
+    assert_eq!(fs::read(picture).expect("still there"), b"a picture");
     assert_eq!(fs::read(bin).expect("still there"), drive_bytes());
 }
 
@@ -796,6 +824,41 @@ fn recordings_that_were_misread_end_where_they_should() {
         };
         let off = apart(end(&drivers), end(&in_order));
         assert!(off.0 < 0.02 && off.1 < 0.3, "{off:?}");
+    }
+}
+
+/// Half of the beams end where the map is unexplored, or on people: the matches are right to millimetres, and are believed.
+#[test]
+fn beams_that_say_nothing_do_not_count_against_a_pose() {
+    let trajectory = folder("quiet-beams").join("t.txt");
+    for (log, map, doubtful) in [
+        ("still.mcap.gz", "border-0.6.yaml", 4),
+        ("people0.5.mcap.gz", "border9.yaml", 8),
+    ] {
+        let (Some(log), Some(map)) = (
+            shared::file(&format!("faults/{log}")),
+            shared::file(&format!("faults/maps/{map}")),
+        ) else {
+            continue;
+        };
+        let result = json(&beamfix(&[
+            "replay",
+            text(&log),
+            "--mode",
+            "localize",
+            "--map",
+            text(&map),
+            "--start=-0.6,0.3,11.459",
+            "--trajectory",
+            text(&trajectory),
+            "--json",
+        ]));
+        // It stands where it starts.
+        let place = TruePose::new(-0.6, 0.3, 11.459f64.to_radians());
+        let off = apart(place, last_pose(&result));
+        assert!(off.0 < 0.02 && off.1 < 0.5, "{off:?}: {result}");
+        let doubts = result["doubtful"].as_u64().expect("a count");
+        assert!(result["lost"] == 0 && doubts <= doubtful, "{result}");
     }
 }
 
