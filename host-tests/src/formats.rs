@@ -9,6 +9,7 @@ pub mod carmen;
 pub mod clock;
 pub mod field;
 pub mod lscan;
+pub mod mirror;
 pub mod no_return;
 pub mod order;
 pub mod pairs;

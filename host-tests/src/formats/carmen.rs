@@ -15,6 +15,7 @@ pub use writer::written;
 use anyhow::{Context, Result, ensure};
 use beamfix::scan::{Beam, Bearing, Mount};
 
+use super::mirror::Mirror;
 use super::no_return::{Limits, Rule};
 use super::{Log, Recorded, clock::Clock};
 use beamfix_sim::TruePose;
@@ -105,35 +106,14 @@ pub fn parse(text: &[u8]) -> Log {
 }
 
 impl Line<'_> {
-    /// Readings of a half or a quarter degree are a SICK's: its mirror takes one a degree and turns in 13.3 ms, so the odd
-    /// ones are those of its next revolution. Those of a degree and all others are taken to be measured at once.
     fn beams(&self, rule: Rule, time_us: u32) -> Vec<Beam> {
-        let revolutions = match (
-            self.readings.len(),
-            libm::round(self.step.to_degrees() * 400.0),
-        ) {
-            (360 | 361, 200.0) => 2,
-            (400 | 401, 100.0) => 4,
-            _ => 1,
-        };
-        let taken_us = |k: usize| {
-            let (pass, degree) = (k % revolutions, k / revolutions);
-            (13_333 * pass + 37 * degree) as u32
-        };
-        let last_us = (0..self.readings.len()).map(taken_us).max().unwrap_or(0);
-        let age_us = |k: usize| {
-            if revolutions == 1 {
-                0
-            } else {
-                last_us - taken_us(k)
-            }
-        };
+        let mirror = Mirror::of(self.readings.len(), self.step);
         let beam = |(k, &reading): (usize, &f32)| {
             let bearing = self.first + self.step * k as f64;
             Beam {
                 bearing: Bearing::from_radians(bearing as f32),
                 range: rule.range(reading, self.limits),
-                time_us: time_us.wrapping_sub(age_us(k)),
+                time_us: time_us.wrapping_sub(mirror.age_us(k)),
                 quality: 0,
             }
         };

@@ -7,6 +7,7 @@
 use anyhow::{Result, bail, ensure};
 use beamfix::scan::{Beam, Bearing};
 
+use super::mirror::Mirror;
 use super::no_return::{Limits, Rule};
 use super::{Log, Recorded, clock::Clock};
 use beamfix_sim::TruePose;
@@ -67,10 +68,11 @@ pub fn parse(bytes: &[u8]) -> Result<Log> {
             continue;
         }
         let driver_us = clock.at(time_us as f64 * 1e-6);
+        let mirror = Mirror::of(readings.len(), step);
         let beam = |(k, &reading): (usize, &f32)| Beam {
             bearing: Bearing::from_radians((first + step * k as f64) as f32),
             range: rule.range(reading, limits),
-            time_us: driver_us,
+            time_us: driver_us.wrapping_sub(mirror.age_us(k)),
             quality: 0,
         };
         log.scans.push(Recorded {
