@@ -4,11 +4,11 @@ use anyhow::{Result, ensure};
 use beamfix::geometry::Pose;
 use beamfix::grid::{
     Grid, Shape,
-    cast::Skipping,
+    cast::{Hit, Ray, Skipping},
     distance,
     occupancy::{self, Cell, UpdateConfig},
 };
-use beamfix::scan::{NoReturn, ScanPoint};
+use beamfix::scan::{Bearing, NoReturn, ScanPoint};
 use beamfix::sensor_model::{
     BeamModel,
     beam_model::learning::{ByIncidence, Learner},
@@ -117,7 +117,7 @@ pub fn pairs(log: &Log, map: &Map, range_max: f32) -> Vec<Pair> {
                 );
                 pairs.push(Pair {
                     range,
-                    expected: hit.range,
+                    expected: to_surface(map, pose, beam.bearing, hit),
                     cosine,
                 });
             }
@@ -125,6 +125,32 @@ pub fn pairs(log: &Log, map: &Map, range_max: f32) -> Vec<Pair> {
     }
     pairs
 }
+
+/// Range (m) to the surface that a beam meets at the cell `hit`: to the middle of the occupied cells that follow each other
+/// from there on, at most [`DEEPEST`]. A wall that lies between two cells has made both of them occupied.
+fn to_surface(map: &Map, pose: Pose, bearing: Bearing, hit: Hit) -> f32 {
+    let longest = (hit.range * 1000.0) as u16 + 1000;
+    let Some(mut ray) = Ray::new(map.shape(), pose, bearing) else {
+        return hit.range;
+    };
+    let last = ray
+        .cells(longest)
+        .skip_while(|&cell| cell != hit.cell)
+        .take_while(|&(x, y)| map.get(x, y).is_some_and(occupancy::is_occupied))
+        .take(DEEPEST)
+        .last()
+        .unwrap_or(hit.cell);
+    let (s, c) = beamfix::math::sin_cos(pose.theta + bearing.radians());
+    let foot = |(x, y): (i32, i32)| {
+        let middle = map.shape().middle_of(x, y);
+        (middle.x - pose.x) * c + (middle.y - pose.y) * s
+    };
+    hit.range + 0.5 * (foot(last) - foot(hit.cell))
+}
+
+/// Most cells on a beam's way that are taken for one surface. Chosen on intel's log, where two give 0.08 nat a beam more than one
+/// and a sigma of 0.040 m for 0.045, three 0.07; fr079's confirms: 0.06 nat, 0.059 m for 0.066.
+const DEEPEST: usize = 2;
 
 /// Cosine between a beam and the wall that it meets: the wall's normal is the slope of the squared distances around.
 fn incidence(shape: &Shape, walls: &[u16], cell: (i32, i32), direction: f32) -> f32 {
