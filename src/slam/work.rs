@@ -29,6 +29,8 @@ const LOOK: u32 = 8_000;
 const MEET: u32 = 10_000;
 const MEET_LOOSE: u32 = 40_000;
 const WEIGH: u32 = 3_500;
+/// Keyframes looked at again between one new keyframe and the next.
+const AGAIN: u16 = 4;
 
 impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: usize>
     Slam<K, E, L, B, V>
@@ -96,21 +98,24 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         if self.wants_room() {
             return Work::Weigh(0);
         }
-        // Time is left: keyframes are weighed before room is needed. And one may find loops that its first look did not, as the poses were not as good. Each once, until
-        // there is a new keyframe, and as long as there is ample room.
+        // Time is left: keyframes are weighed before room is needed.
         let unweighed = (0..K as Slot).find(|slot| self.is_worth_unknown(*slot));
         if let Some(slot) = unweighed.filter(|_| 2 * self.graph.len() > K) {
             return Work::Weigh(slot);
         }
+        // And a keyframe may find loops that its first look did not, as the poses were not as good: a few between one new
+        // keyframe and the next, as long as there is ample room. All in turn, so each is looked at again.
         let room = self.graph.edges().len() + 4 * super::FRESH < E;
-        while room && usize::from(self.quiet) < K {
-            self.quiet += 1;
+        let mut passed = 0;
+        while room && self.quiet < AGAIN && passed < K {
+            passed += 1;
             self.again = if usize::from(self.again) + 1 < K {
                 self.again + 1
             } else {
                 0
             };
             if self.graph.node(self.again).is_some() {
+                self.quiet += 1;
                 return Work::Look(self.again);
             }
         }
@@ -121,6 +126,8 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         match self.solver.step(&mut self.graph, budget) {
             Progress::Working => {}
             Progress::TooDense => {
+                // More loops would only push out others.
+                self.quiet = AGAIN;
                 if self.thin() {
                     self.solver.start(true);
                 } else {
