@@ -16,11 +16,15 @@
 mod estimator;
 mod gyro;
 mod map_localizer;
+#[cfg(feature = "internals")]
+mod mapper;
 mod tracker;
 mod wheels;
 
 pub use estimator::{Estimate, Estimator, Verdict};
 pub use map_localizer::{Located, MapLocalizer};
+#[cfg(feature = "internals")]
+pub use mapper::{Mapped, Mapper, Mapper192k, Mapper512k};
 pub use tracker::{Revolution, Tracker};
 
 use crate::lidar::{Packet, Protocol};

@@ -7,6 +7,7 @@
 //! | match against what those around that place see together, check, wait for confirmation | `closing`, `verify` |
 //! | solve the pose graph, loops weighted by how well they agree | `solver`, `graph` |
 //! | remove the keyframe that tells least where the memory is full | `room`, `pruning` |
+//! | draw the map from the keyframes | `rendering` |
 //!
 //! Odometry goes in with every scan ([`Slam::update`]); everything else is done in slices in the time between scans
 //! ([`Slam::step`]). Poses are given in the frame of a keyframe ([`Placed`]), since keyframes still move.
@@ -18,6 +19,7 @@ pub mod graph;
 mod keeping;
 mod loops;
 mod pruning;
+mod rendering;
 mod room;
 pub mod solver;
 mod store;
@@ -44,10 +46,13 @@ use crate::{
     scan::ScanPoint,
 };
 
-/// SLAM for a controller of 192 KB: 224 keyframes of 144 points. Needs 161 KB itself.
+/// SLAM for a controller of 192 KB: 224 keyframes of 144 points. Needs 157 KB itself.
 pub type Slam192k = Slam<224, 512, 880, 144, 360>;
-/// SLAM for a controller of 512 KB: 560 keyframes of 180 points. Needs 455 KB itself.
+/// SLAM for a controller of 512 KB: 560 keyframes of 180 points. Needs 451 KB itself.
 pub type Slam512k = Slam<560, 1400, 2800, 180, 720>;
+
+/// A budget for [`Slam::step`] between two scans of 5 to 15 a second: two million instructions of a Cortex-M4F, 15 ms at 168 MHz.
+pub const SLICE: u32 = 20_000;
 
 /// Keyframes and loops since the start; every number wraps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -101,14 +106,14 @@ const PENDING: usize = 48;
 /// Keyframes, graph and all working memory: at most K keyframes of B points, E edges, L blocks of the solver's factor, and
 /// V directions of what several keyframes see together.
 ///
-/// About `(75 + 2·B)·K + 44·E + 44·L + 16·B + 32·V` bytes.
+/// About `(77 + 2·B)·K + 48·E + 44·L + 16·B + 32·V` bytes.
 #[derive(Debug, Clone)]
 pub struct Slam<const K: usize, const E: usize, const L: usize, const B: usize, const V: usize> {
     config: SlamConfig,
     graph: Graph<K, E>,
     scans: [PackedScan<B>; K],
     solver: Solver<K, L>,
-    drift: Drift<K>,
+    drift: Drift<K, E>,
     /// Expected information of each keyframe (256ths of a bit); [`room::UNWEIGHED`] where it is to be weighed anew.
     worth: [u16; K],
     /// What keyframes see together, as points and as lines.

@@ -16,11 +16,8 @@ use crate::{
         Match,
         icp::projective::{IcpConfig, Search, align},
     },
-    math,
 };
 
-/// A guess that may be this far off (m, 3σ) is none that a local match finds its pose from.
-const LOOSE: f32 = 0.3;
 /// Matches of one place are not independent, and their errors larger than each tells by this factor (of σ²).
 const MATCH_INFLATION: f32 = 4.0;
 
@@ -38,34 +35,30 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         found
     }
 
-    /// Matches a keyframe against what is seen around an earlier one; whether from several guesses.
-    pub(super) fn meet(&mut self, slot: Slot, candidate: &Candidate) -> bool {
-        let loose = 3.0 * math::sqrt(candidate.variance.0) > LOOSE;
-        // Where the graph does not know, the robot may as well be back at the very place.
-        let there = Pose::new(0.0, 0.0, candidate.guess.theta);
-        let guesses = [candidate.guess, there];
-        for guess in guesses.into_iter().take(if loose { 2 } else { 1 }) {
-            self.counters.tried = self.counters.tried.wrapping_add(1);
-            let found = self.matched(slot, candidate.slot, guess, loose);
-            let believed = found.filter(|found| {
-                let off = candidate.guess.between(found.pose);
-                verify::is_plausible(found, loose, &self.config)
-                    && verify::is_expected(off, candidate.variance, found)
-            });
-            if let Some(found) = believed {
-                self.propose(slot, candidate.slot, &found, loose);
-                return loose;
-            }
+    /// Matches the points at hand from a guess of their pose in the candidate's frame, against what
+    /// [`Slam::show`](Self::show) has shown from there; whether a loop is proposed.
+    pub(super) fn meet(&mut self, slot: Slot, candidate: &Candidate, guess: Pose) -> bool {
+        self.counters.tried = self.counters.tried.wrapping_add(1);
+        let loose = candidate.is_loose();
+        let believed = self.matched(guess, loose).filter(|found| {
+            let off = candidate.guess.between(found.pose);
+            verify::is_plausible(found, loose, &self.config)
+                && verify::is_expected(off, candidate.variance, found)
+        });
+        let Some(found) = believed else {
             self.counters.refused = self.counters.refused.wrapping_add(1);
-        }
-        loose
+            return false;
+        };
+        self.propose(slot, candidate.slot, &found, loose);
+        true
     }
 
-    /// The pose of `slot` in the frame of `earlier`, by a match against what is seen from `guess`.
-    fn matched(&mut self, slot: Slot, earlier: Slot, guess: Pose, loose: bool) -> Option<Match> {
+    /// Makes what the keyframes around an earlier one see the reference, as seen from a guess of the pose of `slot` in its
+    /// frame, and takes the points of `slot` to hand.
+    pub(super) fn show(&mut self, slot: Slot, earlier: Slot, guess: Pose) {
         self.drift
             .assign(&self.graph, earlier, loops::WELL_KNOWN, 1.0);
-        let at = self.graph.pose(earlier)? * guess;
+        let at = self.graph.pose(earlier).unwrap_or_default() * guess;
         self.view.clear();
         for other in loops::neighbours(&self.graph, &self.drift, slot, at, &self.config) {
             let scan = self.scans.get(usize::from(other));
@@ -76,7 +69,12 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         }
         self.view.finish();
         self.reference.assign(self.view.as_slice());
-        self.scans.get(usize::from(slot))?.unpack(&mut self.own);
+        if let Some(scan) = self.scans.get(usize::from(slot)) {
+            scan.unpack(&mut self.own);
+        }
+    }
+
+    fn matched(&self, guess: Pose, loose: bool) -> Option<Match> {
         let config = IcpConfig {
             search: if loose { Search::Global } else { Search::Local },
             ..IcpConfig::DEFAULT
@@ -142,8 +140,8 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
             !taken
         });
         self.contradicted = true;
-        for edge in confirmed {
-            self.close(edge);
+        for edge in &confirmed {
+            self.close(*edge);
         }
     }
 
@@ -160,9 +158,17 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
 
     /// Removes some loops where there are most; whether there were any.
     pub(super) fn thin(&mut self) -> bool {
+        let mut degrees = [0u16; K];
+        for edge in self.graph.edges() {
+            for end in [edge.from, edge.to] {
+                if let Some(degree) = degrees.get_mut(usize::from(end)) {
+                    *degree += 1;
+                }
+            }
+        }
         let mut thinned = false;
         for _ in 0..E.div_ceil(64) {
-            let degree = |slot| self.graph.edges_at(slot).count();
+            let degree = |slot: Slot| degrees.get(usize::from(slot)).copied().unwrap_or(0);
             let crowd = |edge: &&Edge| degree(edge.from).min(degree(edge.to));
             let edges = self.graph.edges().iter();
             let loops = edges.filter(|edge| edge.kind == Kind::Loop);
@@ -170,6 +176,11 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
                 break;
             };
             self.graph.retain_edges(|edge| *edge != most);
+            for end in [most.from, most.to] {
+                if let Some(degree) = degrees.get_mut(usize::from(end)) {
+                    *degree = degree.saturating_sub(1);
+                }
+            }
             self.counters.dropped = self.counters.dropped.wrapping_add(1);
             thinned = true;
         }

@@ -14,7 +14,7 @@ pub(super) const CANDIDATES: usize = 4;
 /// Most keyframes that are seen as one.
 const NEIGHBOURS: usize = 8;
 /// Most keyframes that one is weighed against: what the fourth saw already is worth nothing.
-const AROUND: usize = 12;
+const AROUND: usize = 6;
 
 /// Keyframes whose places against each other are known to this (m²) are seen as one: farther off a second wall would show.
 pub(super) const WELL_KNOWN: f32 = 0.06 * 0.06;
@@ -30,12 +30,32 @@ pub(super) struct Candidate {
     pub variance: (f32, f32),
 }
 
+/// A guess that may be this far off (m, 3σ) is none that a local match finds its pose from.
+const LOOSE: f32 = 0.3;
+
+impl Candidate {
+    /// Whether the graph tells so little of where the keyframe should be that a match must search, and others confirm it.
+    pub(super) fn is_loose(&self) -> bool {
+        3.0 * math::sqrt(self.variance.0) > LOOSE
+    }
+
+    /// Where a match starts: the first, second … guess.
+    pub(super) fn guess(&self, attempt: u8) -> Option<Pose> {
+        match attempt {
+            0 => Some(self.guess),
+            // Where the graph does not know, the robot may as well be back at the very place.
+            1 if self.is_loose() => Some(Pose::new(0.0, 0.0, self.guess.theta)),
+            _ => None,
+        }
+    }
+}
+
 /// The earlier keyframes that may see what `slot` sees, likeliest first; `drift` is that of `slot`.
 ///
 /// Of keyframes made one after the other only the likeliest is taken.
 pub(super) fn candidates<const K: usize, const E: usize>(
     graph: &Graph<K, E>,
-    drift: &Drift<K>,
+    drift: &Drift<K, E>,
     slot: Slot,
     all_around: bool,
     config: &SlamConfig,
@@ -48,10 +68,7 @@ pub(super) fn candidates<const K: usize, const E: usize>(
         let mut best: Option<(f32, Candidate, u32)> = None;
         for (other, node) in graph.nodes() {
             let taken = |(_, id): &(Candidate, u32)| id.abs_diff(node.id) < config.min_apart / 2;
-            if node.id.abs_diff(here.id) < config.min_apart
-                || chosen.iter().any(taken)
-                || graph.are_joined(slot, other)
-            {
+            if node.id.abs_diff(here.id) < config.min_apart || chosen.iter().any(taken) {
                 continue;
             }
             let guess = node.pose.between(here.pose);
@@ -65,7 +82,10 @@ pub(super) fn candidates<const K: usize, const E: usize>(
                 continue;
             }
             let rank = distance + if all_around { 0.0 } else { turn };
-            if best.as_ref().is_none_or(|(least, ..)| rank < *least) {
+            // Edges are gone through for the few that are left.
+            if best.as_ref().is_none_or(|(least, ..)| rank < *least)
+                && !graph.are_joined(slot, other)
+            {
                 let candidate = Candidate {
                     slot: other,
                     guess,
@@ -80,7 +100,11 @@ pub(super) fn candidates<const K: usize, const E: usize>(
         // As many as there is room for.
         let _ = chosen.push((candidate, id));
     }
-    chosen.into_iter().map(|(candidate, _)| candidate).collect()
+    let mut candidates = Vec::new();
+    for (candidate, _) in &chosen {
+        let _ = candidates.push(*candidate);
+    }
+    candidates
 }
 
 /// The keyframes that see what lies around `at` (in the map) and whose places against `candidate` are known well, nearest
@@ -89,7 +113,7 @@ pub(super) fn candidates<const K: usize, const E: usize>(
 /// Those fewer than `min_apart` before or after `slot` are left out: they would only agree with it.
 pub(super) fn neighbours<const K: usize, const E: usize>(
     graph: &Graph<K, E>,
-    drift: &Drift<K>,
+    drift: &Drift<K, E>,
     slot: Slot,
     at: Pose,
     config: &SlamConfig,

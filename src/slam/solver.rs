@@ -121,7 +121,7 @@ impl<const K: usize, const L: usize> Solver<K, L> {
                         return Progress::Solved(longest);
                     }
                     self.phase = Phase::Linearise(0);
-                    K as u32 / 2
+                    3 * K as u32 / 2
                 }
                 Phase::Substitute(left) => self.substitute(left),
             };
@@ -161,21 +161,21 @@ impl<const K: usize, const L: usize> Solver<K, L> {
             self.blocks.add(next.from, next.to, &part.between)?;
         }
         self.phase = Phase::Linearise(edge + 1);
-        Some(4)
+        Some(11)
     }
 
     /// Eliminates the node with the fewest neighbours.
     fn eliminate(&mut self, done: usize) -> Option<u32> {
         let Some(slot) = self.blocks.sparsest() else {
             self.phase = Phase::Substitute(done);
-            return Some(K as u32 / 16);
+            return Some(K as u32 / 10);
         };
         let spent = self.blocks.eliminate(slot)?;
         if let Some(entry) = self.order.get_mut(done) {
             *entry = slot;
         }
         self.phase = Phase::Eliminate(done + 1);
-        Some(K as u32 / 16 + spent)
+        Some(K as u32 / 10 + spent)
     }
 
     /// Solves for the node that was eliminated last of those left.

@@ -15,20 +15,37 @@ pub(super) enum Work {
     Idle,
     /// Earlier keyframes that may see the place of this one are to be found.
     Look(Slot),
-    /// They are to be matched, the last one first.
-    Meet(Slot, Vec<Candidate, CANDIDATES>),
+    /// They are to be matched.
+    Meet(Meeting),
     /// The graph is being solved.
     Solve,
-    /// This keyframe is to be weighed; where room is wanted those after it too, and then the one worth least removed.
+    /// This keyframe is to be weighed.
     Weigh(Slot),
+    /// The keyframe worth least is to be removed, once it is the one that was weighed last.
+    Clear(Option<Slot>),
 }
 
-/// Cost of the search for candidates, of a match from a good guess and from several, and of weighing a keyframe (hundreds
-/// of instructions, estimated from the edges and points they touch; not measured so far).
-const LOOK: u32 = 8_000;
-const MEET: u32 = 10_000;
-const MEET_LOOSE: u32 = 40_000;
-const WEIGH: u32 = 3_500;
+/// A keyframe that is matched with earlier ones.
+#[derive(Debug, Clone)]
+pub(super) struct Meeting {
+    slot: Slot,
+    /// The likeliest last.
+    candidates: Vec<Candidate, CANDIDATES>,
+    /// Guesses for the last candidate that led nowhere.
+    attempt: u8,
+    /// What is seen around it was made the reference.
+    is_shown: bool,
+}
+
+/// Costs of the pieces of work in hundreds of instructions of a Cortex-M4F, for the tier of 192 KB, as measured on a
+/// recorded log: about what nine in ten cost. A match that searches is the largest.
+mod cost {
+    pub const LOOK: u32 = 2_500;
+    pub const SHOW: u32 = 10_000;
+    pub const MEET: u32 = 6_000;
+    pub const MEET_LOOSE: u32 = 30_000;
+    pub const WEIGH: u32 = 7_000;
+}
 /// Keyframes looked at again between one new keyframe and the next.
 const AGAIN: u16 = 4;
 
@@ -36,55 +53,106 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
     Slam<K, E, L, B, V>
 {
     /// Works for about `budget` hundreds of a Cortex-M4F's instructions, and at least one piece: a match, a node of the
-    /// factor. Whether there is more to do.
+    /// factor. A piece that costs more than what is left is kept for the next call. Whether there is more to do.
     ///
     /// Returns early where a keyframe was removed: see [`Slam::take_merged`].
     pub fn step(&mut self, budget: u32) -> bool {
-        let mut budget = budget;
-        while budget > 0 && self.merged.is_none() {
-            match &mut self.work {
+        let mut left = budget;
+        while left > 0 && self.merged.is_none() {
+            let cost = self.cost();
+            if cost > left && left < budget {
+                break;
+            }
+            left = left.saturating_sub(cost);
+            self.work = match core::mem::replace(&mut self.work, Work::Idle) {
                 Work::Idle => match self.next() {
                     Work::Idle => return false,
-                    work => self.work = work,
+                    work => work,
                 },
-                Work::Look(slot) => {
-                    let slot = *slot;
-                    budget = budget.saturating_sub(LOOK);
-                    self.work = Work::Meet(slot, self.candidates(slot));
-                }
-                Work::Meet(slot, candidates) => {
-                    let (slot, candidate) = (*slot, candidates.pop());
-                    let Some(candidate) = candidate.filter(|_| !self.has_loops(slot)) else {
-                        self.work = Work::Idle;
-                        continue;
-                    };
-                    let loose = self.meet(slot, &candidate);
-                    budget = budget.saturating_sub(if loose { MEET_LOOSE } else { MEET });
-                }
-                Work::Solve => self.solve(&mut budget),
+                Work::Look(slot) => Work::Meet(Meeting {
+                    slot,
+                    candidates: self.candidates(slot),
+                    attempt: 0,
+                    is_shown: false,
+                }),
+                Work::Meet(meeting) => self.go_on(meeting),
+                Work::Solve => self.solve(&mut left),
                 Work::Weigh(slot) => {
-                    let slot = *slot;
-                    let unknown = self.is_worth_unknown(slot);
-                    budget = budget.saturating_sub(if unknown { WEIGH } else { 1 });
-                    self.work = if usize::from(slot) < K {
-                        self.weigh(slot);
-                        if self.wants_room() {
-                            Work::Weigh(slot + 1)
-                        } else {
-                            Work::Idle
-                        }
-                    } else {
-                        self.remove_least();
-                        Work::Idle
-                    };
+                    self.weigh(slot);
+                    Work::Idle
                 }
-            }
+                Work::Clear(weighed) => self.clear(weighed),
+            };
         }
         true
     }
 
+    /// What the next piece of work costs; solving counts by itself.
+    fn cost(&self) -> u32 {
+        match &self.work {
+            Work::Idle | Work::Solve => 1,
+            Work::Look(_) => cost::LOOK,
+            Work::Meet(meeting) => match meeting.candidates.last() {
+                Some(_) if !meeting.is_shown => cost::SHOW,
+                Some(candidate) if candidate.is_loose() => cost::MEET_LOOSE,
+                Some(_) => cost::MEET,
+                None => 1,
+            },
+            Work::Weigh(_) | Work::Clear(_) => cost::WEIGH,
+        }
+    }
+
+    /// Weighs the keyframe that seems worth least, or removes it if it is the one that was weighed last.
+    fn clear(&mut self, weighed: Option<Slot>) -> Work {
+        match self.least() {
+            None => {
+                self.stuck = true;
+                Work::Idle
+            }
+            Some(slot) if weighed == Some(slot) => {
+                self.make_room(slot);
+                Work::Idle
+            }
+            Some(slot) => {
+                self.weigh(slot);
+                Work::Clear(Some(slot))
+            }
+        }
+    }
+
+    /// The next piece of a meeting.
+    fn go_on(&mut self, mut meeting: Meeting) -> Work {
+        let Some(candidate) = meeting.candidates.last().copied() else {
+            return Work::Idle;
+        };
+        if self.has_loops(meeting.slot) {
+            return Work::Idle;
+        }
+        let Some(guess) = candidate.guess(meeting.attempt) else {
+            meeting.candidates.pop();
+            (meeting.attempt, meeting.is_shown) = (0, false);
+            return Work::Meet(meeting);
+        };
+        if !meeting.is_shown {
+            self.show(meeting.slot, candidate.slot, guess);
+        } else if self.meet(meeting.slot, &candidate, guess) {
+            meeting.candidates.pop();
+            meeting.attempt = 0;
+        } else {
+            meeting.attempt += 1;
+        }
+        meeting.is_shown = !meeting.is_shown;
+        Work::Meet(meeting)
+    }
+
     /// What is to be done first.
     fn next(&mut self) -> Work {
+        if self.wants_room() {
+            return match self.unweighed() {
+                Some(slot) => Work::Weigh(slot),
+                None => Work::Clear(None),
+            };
+        }
         if let Some(slot) = self.fresh.pop_front() {
             return Work::Look(slot);
         }
@@ -95,12 +163,10 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         if self.graph.edges().len() + 2 * super::FRESH > E {
             self.thin();
         }
-        if self.wants_room() {
-            return Work::Weigh(0);
-        }
         // Time is left: keyframes are weighed before room is needed.
-        let unweighed = (0..K as Slot).find(|slot| self.is_worth_unknown(*slot));
-        if let Some(slot) = unweighed.filter(|_| 2 * self.graph.len() > K) {
+        if 2 * self.graph.len() > K
+            && let Some(slot) = self.unweighed()
+        {
             return Work::Weigh(slot);
         }
         // And a keyframe may find loops that its first look did not, as the poses were not as good: a few between one new
@@ -122,21 +188,22 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         Work::Idle
     }
 
-    fn solve(&mut self, budget: &mut u32) {
+    fn solve(&mut self, budget: &mut u32) -> Work {
         match self.solver.step(&mut self.graph, budget) {
-            Progress::Working => {}
+            Progress::Working => Work::Solve,
             Progress::TooDense => {
                 // More loops would only push out others.
                 self.quiet = AGAIN;
                 if self.thin() {
                     self.solver.start(true);
+                    Work::Solve
                 } else {
-                    self.work = Work::Idle;
+                    Work::Idle
                 }
             }
             Progress::Solved(_) | Progress::Idle => {
                 self.counters.solved = self.counters.solved.wrapping_add(1);
-                self.work = Work::Idle;
+                Work::Idle
             }
         }
     }
