@@ -1,6 +1,19 @@
-//! Puts memory.x where the linker looks for it.
+//! Puts a memory.x where the linker looks for it: the machine's RAM, or just that of a tier.
+use std::{env, fs, path::Path};
+
 fn main() {
-    let here = std::env::var("CARGO_MANIFEST_DIR").expect("set by cargo");
-    println!("cargo:rustc-link-search={here}");
+    let out = env::var("OUT_DIR").expect("set by cargo");
+    let memory = fs::read_to_string("memory.x").expect("memory.x beside this file");
+    let ram = if env::var_os("CARGO_FEATURE_TIER_192K").is_some() {
+        "192K"
+    } else if env::var_os("CARGO_FEATURE_TIER_512K").is_some() {
+        "512K"
+    } else {
+        "4M"
+    };
+    let line = "RAM : ORIGIN = 0x20000000, LENGTH = ";
+    let memory = memory.replace(&format!("{line}4M"), &format!("{line}{ram}"));
+    fs::write(Path::new(&out).join("memory.x"), memory).expect("OUT_DIR can be written");
+    println!("cargo:rustc-link-search={out}");
     println!("cargo:rerun-if-changed=memory.x");
 }

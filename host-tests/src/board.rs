@@ -11,6 +11,7 @@ pub mod maps;
 pub mod real;
 pub mod real_card;
 pub mod rp2040js;
+pub mod slam;
 pub mod start;
 pub mod stream;
 

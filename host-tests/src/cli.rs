@@ -9,6 +9,7 @@ mod lidars;
 mod output;
 mod pairs;
 mod prior;
+mod prune;
 mod regress;
 mod replay;
 mod scenes;
@@ -46,6 +47,7 @@ enum Command {
     Lidars(lidars::Args),
     Bench(bench::Args),
     Card(card::Args),
+    Prune(prune::Args),
     Scenes(scenes::Args),
     Tune(tune::Args),
     Verify(verify::Args),
@@ -68,6 +70,7 @@ pub fn run() -> ExitCode {
         Some(Command::Pairs(args)) => pairs::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Card(args)) => card::run(&args),
+        Some(Command::Prune(args)) => prune::run(&args),
         Some(Command::Scenes(args)) => scenes::run(&args),
         Some(Command::Tune(args)) => tune::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),

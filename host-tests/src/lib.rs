@@ -5,6 +5,7 @@ pub mod decode;
 pub mod formats;
 pub mod golden;
 pub mod learn;
+pub mod mapping;
 pub mod matcher;
 pub mod pipeline;
 pub mod regress;

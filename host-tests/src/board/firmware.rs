@@ -58,7 +58,7 @@ impl Firmware {
             "" => self.package,
             other => other,
         };
-        let has_proof = program == self.package || matches!(program, "maps" | "stages");
+        let has_proof = program == self.package || matches!(program, "maps" | "mapping" | "stages");
         let proof = match self.is_proven && has_proof {
             true => "prove-no-panic",
             false => "",

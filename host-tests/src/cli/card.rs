@@ -1,8 +1,9 @@
 //! `card`: what the firmware takes on each emulated board.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use beamfix::lidar::Model;
 use host_tests::board::{
     BOARDS, Board,
@@ -10,7 +11,10 @@ use host_tests::board::{
     drivers, maps,
     real::{REAL, Real},
     real_card::RealCard,
+    slam,
 };
+use host_tests::formats;
+use host_tests::mapping::{Tier, building};
 
 use super::output;
 
@@ -27,13 +31,44 @@ pub struct Args {
     /// Write the figures to `host-tests/golden/card.json` and into the README's table.
     #[arg(long, conflicts_with = "board")]
     bless: bool,
+    /// Mapping instead, on the emulated Cortex-M4F with just this RAM: a simulated building, twice round.
+    #[arg(long, value_name = "TIER", value_parser = tier, conflicts_with_all = ["board", "bless", "json"])]
+    tier: Option<Tier>,
+    /// Map this recorded log instead.
+    #[arg(long, value_name = "FILE", requires = "tier")]
+    log: Option<PathBuf>,
+    /// Stop after so many scans.
+    #[arg(long, value_name = "N", requires = "tier")]
+    scans: Option<usize>,
     /// Print one JSON list.
     #[arg(long)]
     json: bool,
 }
 
+fn tier(name: &str) -> Result<Tier> {
+    match name {
+        "192k" => Ok(Tier::Of192k),
+        "512k" => Ok(Tier::Of512k),
+        _ => bail!("192k or 512k"),
+    }
+}
+
+/// What mapping costs.
+fn mapping(args: &Args, tier: Tier) -> Result<ExitCode> {
+    let (name, log) = match &args.log {
+        Some(path) => (path.display().to_string(), formats::read(path)?),
+        None => ("a simulated building".to_owned(), building::log(2, 1).0),
+    };
+    let costs = slam::measure(tier, &log, args.scans.unwrap_or(usize::MAX))?;
+    println!("{}", costs.text(&name));
+    Ok(ExitCode::SUCCESS)
+}
+
 /// Builds, runs, reports.
 pub fn run(args: &Args) -> Result<ExitCode> {
+    if let Some(tier) = args.tier {
+        return mapping(args, tier);
+    }
     let commands = card::drive_commands();
     let only = args.board.as_deref();
     let real: Vec<&Real> = match only {

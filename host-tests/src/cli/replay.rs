@@ -38,7 +38,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let done = match args.mode {
         Mode::Localize => localize::run(args, &log, size)?,
         Mode::Odometry => odometry::run(args, &log, (size, directions))?,
-        Mode::Slam => slam::run(args, &log, (size, directions))?,
+        Mode::Slam => slam::run(args, &log, directions)?,
     };
     let name = args.log.display();
     output::remark(&[format!("{name}: {}", taken(args, &log))]);

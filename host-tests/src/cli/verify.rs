@@ -5,8 +5,9 @@ use std::process::ExitCode;
 use anyhow::Result;
 use beamfix::geometry::Pose;
 use beamfix_app::BEAMS;
-use host_tests::board::{BOARDS, Board, Replay, emulator::Count};
+use host_tests::board::{BOARDS, Board, Replay, emulator::Count, slam};
 use host_tests::golden::{self, Golden};
+use host_tests::mapping::{Tier, building};
 use serde_json::{Value, json};
 
 use super::output;
@@ -72,6 +73,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             }
         }
     }
+    if !args.bless && boards.iter().any(|board| board.name == "m4f") {
+        table.push(mapped());
+    }
     let same = table.iter().all(|row| row.difference.is_none());
     let mut text: Vec<String> = table.iter().map(Row::text).collect();
     if runs.len() < 2 {
@@ -92,6 +96,25 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     } else {
         ExitCode::from(DIFFERENT)
     })
+}
+
+/// SLAM in the simulated building, in just the RAM of its tier: host and board compared.
+fn mapped() -> Row {
+    /// Round once, with the loop closed.
+    const ROUNDS: usize = 1;
+    let (log, _) = building::log(ROUNDS, 1);
+    let measured = slam::measure(Tier::Of192k, &log, usize::MAX);
+    let (hash, difference) = match &measured {
+        Ok(costs) => (costs.hash.to_string(), None),
+        Err(error) => (String::new(), Some(format!("{error:#}"))),
+    };
+    Row {
+        run: "building",
+        machine: "m4f, slam 192k".to_owned(),
+        scans: log.scans.len(),
+        hash,
+        difference,
+    }
 }
 
 /// One run on one machine.

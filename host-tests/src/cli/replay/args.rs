@@ -56,6 +56,9 @@ pub struct Args {
     /// The map to localize in: a ROS map's YAML file, or a table that `field` wrote. Only read, with --mode localize.
     #[arg(long, value_name = "FILE")]
     pub map: Option<PathBuf>,
+    /// Write the map here, as a ROS map: this YAML file and a picture beside it. With --mode slam.
+    #[arg(long, value_name = "FILE")]
+    pub map_out: Option<PathBuf>,
     /// Draw what was seen and driven into this file, .png or .svg.
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
@@ -117,6 +120,10 @@ impl Args {
             ),
             _ => {}
         }
+        ensure!(
+            self.map_out.is_none() || self.mode == Mode::Slam,
+            "--map-out: the map that was made, with --mode slam"
+        );
         ensure!(
             self.start.is_none() || self.mode == Mode::Localize,
             "--start: a place in a map, for --mode localize"
