@@ -2,7 +2,10 @@
 
 use std::io::{self, Write};
 
-use beamfix::geometry::{Point, Pose};
+use beamfix::{
+    geometry::{Point, Pose},
+    scan::Mount,
+};
 use beamfix_app::{
     link::{Counters, Receiver},
     telemetry::{Health, Quality, Ready, Telemetry},
@@ -175,14 +178,23 @@ impl<W: Write> Watch<W> {
                 }
             }
             Telemetry::Scan(piece) => {
+                // A board that was not heard starting: as if the lidar sat at the robot's centre, looking forward.
+                let mount = self
+                    .ready
+                    .map_or(Mount::DEFAULT, |ready| ready.mount.mount());
                 for (k, (bearing, mm)) in piece.beams().enumerate() {
                     if piece.turn_start == Some(k as u8) {
                         self.place();
                     }
                     if mm > 0 {
-                        let (s, c) = beamfix::math::sin_cos(bearing.radians());
+                        let bearing = match mount.upside_down {
+                            true => -bearing.radians(),
+                            false => bearing.radians(),
+                        };
+                        let (s, c) = beamfix::math::sin_cos(bearing);
                         let metres = f32::from(mm) / 1000.0;
-                        self.revolution.push(Point::new(metres * c, metres * s));
+                        let seen = Point::new(metres * c, metres * s);
+                        self.revolution.push(mount.robot_from_lidar * seen);
                     }
                 }
             }

@@ -1,6 +1,12 @@
 //! Settings of the firmware's application.
 
-use beamfix::{lidar::motor::MotorConfig, odometry::OdometryConfig};
+use beamfix::{
+    lidar::{Model, motor::MotorConfig},
+    odometry::OdometryConfig,
+};
+
+#[cfg(feature = "mavlink")]
+use crate::mavlink::Autopilot;
 
 /// The settings of all boards: change them here. One that is out of its range does not compile.
 pub const CONFIG: AppConfig = checked(AppConfig::DEFAULT);
@@ -16,10 +22,15 @@ const fn checked(config: AppConfig) -> AppConfig {
 /// Settings of [`App`](crate::App).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AppConfig {
+    /// The lidar: how far it sees. Default: an LD06.
+    pub lidar: &'static Model,
     /// How the lidar sits on the robot, what is believed and what is not.
     pub odometry: OdometryConfig,
     /// What is sent. Default: frames.
     pub output: Output,
+    /// Which autopilot MAVLink is for. Default: PX4.
+    #[cfg(feature = "mavlink")]
+    pub autopilot: Autopilot,
     /// Whether the lidar's bytes, wheels and gyroscope are sent on with their times, for a replay on a PC. Default: no;
     /// a command switches it.
     pub record: bool,
@@ -36,8 +47,11 @@ pub struct AppConfig {
 impl AppConfig {
     /// An LD06 at the robot's centre, frames out.
     pub const DEFAULT: Self = Self {
+        lidar: &Model::LDROBOT_LD06,
         odometry: OdometryConfig::DEFAULT,
         output: Output::Frames,
+        #[cfg(feature = "mavlink")]
+        autopilot: Autopilot::Px4,
         record: false,
         scans: false,
         quality: false,

@@ -11,13 +11,11 @@
 
 #[cfg(feature = "demo")]
 pub mod checks;
-pub mod command;
 mod config;
 #[cfg(feature = "demo")]
 pub mod demo;
 #[cfg(feature = "demo")]
 pub mod hash;
-pub mod link;
 #[cfg(feature = "mavlink")]
 pub mod mavlink;
 pub mod pairs;
@@ -25,7 +23,6 @@ mod report;
 pub mod ring;
 pub mod run;
 pub mod supervisor;
-pub mod telemetry;
 pub mod text;
 
 use beamfix::{
@@ -41,10 +38,9 @@ use report::Report;
 use supervisor::{Care, Seen};
 use telemetry::{Health, Raw, Ready, Reset, Telemetry};
 
+pub use beamfix_telemetry::{VERSION, command, link, telemetry};
 pub use config::{AppConfig, CONFIG, Output};
 
-/// Version of [`telemetry`] and [`command`].
-pub const VERSION: u8 = 4;
 /// What the lidar sends at.
 pub const LIDAR_BAUD: u32 = 230_400;
 /// What frames leave at and commands come in at: a recording with everything switched on takes half of it.
@@ -97,6 +93,7 @@ impl<const N: usize> App<N> {
             version: VERSION,
             beams: N as u16,
             reset,
+            mount: self.report.mount,
         };
         self.report.send(&Telemetry::Ready(ready));
         &self.report.out
@@ -114,7 +111,14 @@ impl<const N: usize> App<N> {
 
     /// Says when the bytes given next came in (µs, wrapping).
     pub fn set_time(&mut self, now_us: u32) {
-        self.report.now_us = now_us;
+        self.report.set_time(now_us);
+    }
+
+    /// What is due by the clock alone, lidar or not: gives what to send, most often nothing. To be called about every
+    /// [`run::TICK_US`], after [`App::set_time`].
+    pub fn tick(&mut self) -> &[u8] {
+        self.report.tick();
+        &self.report.out
     }
 
     /// Takes bytes of the lidar until there is something to send: gives the number of bytes taken and what to send,
@@ -229,9 +233,11 @@ impl<const N: usize> App<N> {
                 });
             }
             Some(Command::Health) => {
-                // What is left of a recording comes too.
-                self.end_piece();
-                self.report.health_due = true;
+                if self.report.may_answer() {
+                    // What is left of a recording comes too.
+                    self.end_piece();
+                    self.report.health_due = true;
+                }
             }
             Some(Command::Send {
                 raw,
@@ -261,10 +267,11 @@ impl<const N: usize> App<N> {
     #[must_use]
     pub fn seen(&self) -> Seen {
         Seen {
-            bytes: self.lidar_bytes,
+            bytes: self.lidar_bytes.wrapping_add(self.report.bytes_lost),
             packets: self.pipeline.lidar().counters().packets,
             turns: self.odometry().counters().scans,
             speed_deg_per_s: self.report.speed_deg_per_s,
+            blind_turns: self.report.blind_turns,
         }
     }
 

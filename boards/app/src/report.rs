@@ -16,12 +16,15 @@ use crate::telemetry::Truth;
 use crate::{
     AppConfig, Output, link,
     supervisor::Care,
-    telemetry::{self, Gyro, Piece, Quality, Raw, Telemetry, Verdict, Wheels},
+    telemetry::{self, Gyro, Mounted, Piece, Quality, Raw, Telemetry, Verdict, Wheels},
     text,
 };
 
 /// Revolutions between two health messages.
 const HEALTH_EVERY: u16 = 16;
+/// Questions that are answered between two revolutions or ticks: an answer is eleven times as long as its question, so that a
+/// flood of them would fill the line and leave no time for the lidar.
+const ANSWERS: u8 = 2;
 
 /// Most bytes that one call gives.
 ///
@@ -44,6 +47,15 @@ pub(crate) struct Report {
     pub bytes_lost: u32,
     pub care: Care,
     pub health_due: bool,
+    pub mount: Mounted,
+    /// Questions answered since the last revolution or tick.
+    answers: u8,
+    /// Revolutions in a row with too few beams to be matched.
+    pub blind_turns: u8,
+    #[cfg(feature = "mavlink")]
+    link: mavlink::Link,
+    #[cfg(feature = "mavlink")]
+    config: AppConfig,
     pub out: Vec<u8, OUT>,
 }
 
@@ -74,10 +86,40 @@ impl Report {
             speed_deg_per_s: 0,
             sequence: 0,
             health_due: false,
+            mount: Mounted::of(&config.odometry.points.mount),
+            answers: 0,
+            blind_turns: 0,
+            #[cfg(feature = "mavlink")]
+            link: mavlink::Link::new(),
+            #[cfg(feature = "mavlink")]
+            config: *config,
             bytes_lost: 0,
             care: Care::NONE,
             out: Vec::new(),
         }
+    }
+
+    /// Says what the board's clock shows (µs, wrapping).
+    pub fn set_time(&mut self, now_us: u32) {
+        self.now_us = now_us;
+        #[cfg(feature = "mavlink")]
+        self.link.set_time(now_us);
+    }
+
+    /// What is due by the clock alone.
+    pub fn tick(&mut self) {
+        self.out.clear();
+        self.answers = 0;
+        #[cfg(feature = "mavlink")]
+        if self.output == Output::Mavlink {
+            self.link.heartbeat_when_due(self.care.lidar, &mut self.out);
+        }
+    }
+
+    /// Whether one more question may be answered now.
+    pub fn may_answer(&mut self) -> bool {
+        self.answers = self.answers.saturating_add(1);
+        self.answers <= ANSWERS
     }
 
     /// Apart, so that its memory is not on the stack during the match.
@@ -86,6 +128,11 @@ impl Report {
         let time_us = revolution.scan.end_us();
         let pose = frame(self.sequence, time_us, revolution.step);
         self.sequence = self.sequence.wrapping_add(1);
+        self.answers = 0;
+        self.blind_turns = match pose.verdict {
+            Verdict::First | Verdict::TooFewBeams => self.blind_turns.saturating_add(1),
+            _ => 0,
+        };
         self.health_due |= self.sequence.is_multiple_of(HEALTH_EVERY);
         self.send(&Telemetry::Pose(pose));
         if self.quality {
@@ -97,8 +144,15 @@ impl Report {
         }
         #[cfg(feature = "mavlink")]
         if self.output == Output::Mavlink {
-            let twist = revolution.estimator.twist();
-            mavlink::append(&pose, twist, revolution.scan, self.now_us, &mut self.out);
+            let told = mavlink::Told {
+                pose,
+                twist: revolution.estimator.twist(),
+                resets: revolution.estimator.counters().lost as u8,
+                autopilot: self.config.autopilot,
+            };
+            let limits = mavlink::Limits::of(&self.config);
+            self.link
+                .append(&told, revolution.scan, &limits, &mut self.out);
         }
     }
 
@@ -163,7 +217,12 @@ impl Report {
             }
             Output::Text => text::append(message, &mut self.out),
             #[cfg(feature = "mavlink")]
-            Output::Mavlink => mavlink::append_heartbeat(message, &mut self.out),
+            Output::Mavlink => {
+                // The board listens: the first heartbeat says so.
+                if let Telemetry::Ready(_) = message {
+                    self.link.heartbeat_when_due(self.care.lidar, &mut self.out);
+                }
+            }
         }
     }
 }

@@ -63,13 +63,37 @@ pub fn run<const N: usize, const L: usize, const C: usize>(
             if care.progress {
                 hardware.feed_watchdog();
             }
+            let due = app.tick();
+            if !due.is_empty() {
+                hardware.send(due);
+            }
         }
-        let mut bytes = [0; PIECE];
-        let (count, is_lidar) = match commands.read(&mut bytes) {
-            0 => (lidar.read(&mut bytes), true),
-            count => (count, false),
-        };
-        if count == 0 {
+        app.set_bytes_lost(lidar.lost());
+        // A piece of each in turn, the lidar's first: a flood of commands takes no more than its share of the time.
+        let mut idle = true;
+        for is_lidar in [true, false] {
+            let mut bytes = [0; PIECE];
+            let count = match is_lidar {
+                true => lidar.read(&mut bytes),
+                false => commands.read(&mut bytes),
+            };
+            idle &= count == 0;
+            let mut rest = bytes.get(..count).unwrap_or_default();
+            while !rest.is_empty() {
+                let (taken, sent) = match is_lidar {
+                    true => app.lidar(rest),
+                    false => app.command(rest),
+                };
+                rest = rest.get(taken..).unwrap_or_default();
+                if !sent.is_empty() {
+                    hardware.send(sent);
+                    hardware.log(app.pose());
+                    #[cfg(feature = "demo")]
+                    hardware.send(app.truth(&mut demo));
+                }
+            }
+        }
+        if idle {
             // Looked at once more with interrupts masked: a byte that came just now would not wake the sleeper.
             // A masked interrupt that is pending does.
             critical_section::with(|_| {
@@ -77,23 +101,6 @@ pub fn run<const N: usize, const L: usize, const C: usize>(
                     hardware.wait();
                 }
             });
-            continue;
-        }
-        app.set_bytes_lost(lidar.lost());
-        let mut rest = bytes.get(..count).unwrap_or_default();
-        while !rest.is_empty() {
-            let (taken, sent) = if is_lidar {
-                app.lidar(rest)
-            } else {
-                app.command(rest)
-            };
-            rest = rest.get(taken..).unwrap_or_default();
-            if !sent.is_empty() {
-                hardware.send(sent);
-                hardware.log(app.pose());
-                #[cfg(feature = "demo")]
-                hardware.send(app.truth(&mut demo));
-            }
         }
     }
 }

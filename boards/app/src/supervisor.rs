@@ -14,6 +14,8 @@ const SILENT_US: u32 = 500_000;
 const NOISE_US: u32 = 1_000_000;
 /// Packets without a revolution for so long: it stands. Two turns at 1 Hz.
 const STANDING_US: u32 = 2_000_000;
+/// Revolutions in a row without enough beams to match: the lidar is blind.
+const BLIND_TURNS: u8 = 5;
 /// Bytes that lead to nothing for so long: a reset is worth trying.
 const HOPELESS_US: u32 = 15_000_000;
 /// A motor that was switched off is started again after so long.
@@ -22,7 +24,7 @@ const PAUSE_US: u32 = 2_000_000;
 /// What the application has seen so far; all wrap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Seen {
-    /// Bytes of the lidar taken.
+    /// Bytes of the lidar taken, or lost on their way: a line that is not read is not silent.
     pub bytes: u32,
     /// Packets that passed their check.
     pub packets: u32,
@@ -30,6 +32,8 @@ pub struct Seen {
     pub turns: u32,
     /// The motor's speed by the last packet.
     pub speed_deg_per_s: u16,
+    /// Revolutions in a row, up to now, that had too few beams with a range to be matched; stays at the most.
+    pub blind_turns: u8,
 }
 
 /// What a look found.
@@ -140,6 +144,8 @@ impl<P: SetDutyCycle> Supervisor<P> {
             LidarState::Noise
         } else if self.fruitless_us >= STANDING_US {
             LidarState::Standing
+        } else if seen.blind_turns >= BLIND_TURNS {
+            LidarState::Blind
         } else {
             LidarState::Turning
         };

@@ -167,6 +167,7 @@ fn lidar(state: LidarState) -> &'static str {
         LidarState::Noise => "sends noise",
         LidarState::Standing => "stands",
         LidarState::Turning => "turns",
+        LidarState::Blind => "is blind",
     }
 }
 

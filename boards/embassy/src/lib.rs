@@ -45,6 +45,10 @@ pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
             if care.progress {
                 feed();
             }
+            let due = app.tick();
+            if !due.is_empty() {
+                let _ = lines.telemetry.write_all(due).await;
+            }
         }
         #[cfg(feature = "demo")]
         simulate(app, &mut demo, &mut lines.telemetry, now_us).await;

@@ -16,4 +16,5 @@ with open(sys.argv[1], "rb") as file:
                 fields[key] = [None if isinstance(v, float) and math.isnan(v) else v for v in value]
             elif isinstance(value, (bytes, bytearray)):
                 fields[key] = list(value)
+        fields["sequence"] = message.get_seq()
         print(json.dumps(fields))

@@ -1,10 +1,11 @@
 //! What the firmware sends.
 
 use beamfix::{
+    geometry,
     lidar::{Packet as _, ld06},
     matching::{Match, MatchError},
     odometry::{Refusal, Step},
-    scan::Bearing,
+    scan::{Bearing, Mount},
 };
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -44,7 +45,7 @@ pub enum Telemetry {
 }
 
 /// The firmware listens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Ready {
     /// Version of the messages; changes whenever one of them does.
     pub version: u8,
@@ -52,6 +53,39 @@ pub struct Ready {
     pub beams: u16,
     /// Why the board has started.
     pub reset: Reset,
+    /// How the lidar sits on the robot: what the bearings of [`Piece`] are to be seen through.
+    pub mount: Mounted,
+}
+
+/// How the lidar sits on the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Mounted {
+    /// Lidar on the robot: forward, left (m) and the direction of its zero (rad).
+    pub pose: [f32; 3],
+    /// Whether it hangs head down: its bearings run the other way round.
+    pub upside_down: bool,
+}
+
+impl Mounted {
+    /// As the settings have it.
+    #[must_use]
+    pub const fn of(mount: &Mount) -> Self {
+        let at = mount.robot_from_lidar;
+        Self {
+            pose: [at.x, at.y, at.theta],
+            upside_down: mount.upside_down,
+        }
+    }
+
+    /// The same for the settings.
+    #[must_use]
+    pub fn mount(&self) -> Mount {
+        let [x, y, theta] = self.pose;
+        Mount {
+            robot_from_lidar: geometry::Pose::new(x, y, theta),
+            upside_down: self.upside_down,
+        }
+    }
 }
 
 /// Why a board has started.
@@ -294,6 +328,8 @@ pub enum LidarState {
     Standing,
     /// All is well.
     Turning,
+    /// Revolutions come, but hardly a beam of them has a range: covered, dirty, or in a void.
+    Blind,
 }
 
 /// What the lidar's motor does.
@@ -337,7 +373,7 @@ pub struct Gyro {
     pub rate: f32,
 }
 
-/// Beams of a packet, in equal steps.
+/// Beams of a packet, in equal steps, as the lidar sees them.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Piece {
     /// Which of them is the first of a revolution, if one is.
