@@ -2,6 +2,7 @@
 
 use super::lidar::{Ranging, quality};
 use super::noise::Noise;
+use super::place::Place;
 use super::pose::TruePose;
 use super::robot::{PERIOD, Robot, WheelErrors};
 use super::scenes;
@@ -68,8 +69,19 @@ const STANDING: f64 = 1.0;
 /// Drives one round through the flat with `sensor` on board.
 #[must_use]
 pub fn drive(settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
-    let world = scenes::flat();
     let (start, way) = scenes::flat_round();
+    let flat = Place {
+        world: scenes::flat(),
+        start,
+        way,
+    };
+    drive_in(flat, settings, sensor)
+}
+
+/// Drives the way of a place with `sensor` on board.
+#[must_use]
+pub fn drive_in(place: Place, settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
+    let Place { world, start, way } = place;
     let mut robot = Robot::new(start, way, settings.wheels, Noise::new(settings.seed, 1));
     let mut noise = Noise::new(settings.seed, 2);
     let (mut bytes, mut frames, mut moments) = (Vec::new(), Vec::new(), Vec::new());

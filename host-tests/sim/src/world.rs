@@ -1,6 +1,7 @@
 //! What the lidar sees: line segments and circles, cast exactly.
 
 use super::noise::Noise;
+use super::pose::TruePose;
 
 /// A straight wall from one point to another (m).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +47,63 @@ impl World {
             }
         }
         (low, high)
+    }
+
+    /// The faces between full and free cells of a grid of (columns, rows): cells of side `cell` (m), the first one's corner at
+    /// `origin`. Cells outside are free. Faces in a row are one.
+    #[must_use]
+    pub fn of_cells(
+        (columns, rows): (usize, usize),
+        cell: f64,
+        origin: TruePose,
+        is_full: &dyn Fn(usize, usize) -> bool,
+    ) -> Self {
+        let full = |x: usize, y: usize| {
+            // One is added to both, so that what is left of the first is none.
+            (1..=columns).contains(&x) && (1..=rows).contains(&y) && is_full(x - 1, y - 1)
+        };
+        let mut world = Self::default();
+        let mut face = |from: [usize; 2], to: [usize; 2]| {
+            let [from, to] = [from, to].map(|[x, y]| {
+                let place = origin.then(TruePose::new(x as f64 * cell, y as f64 * cell, 0.0));
+                [place.x, place.y]
+            });
+            world.line(from, to);
+        };
+        for (along, across, is_row) in [(columns, rows, true), (rows, columns, false)] {
+            for line in 0..=across {
+                let differs = |k: usize| {
+                    let (here, there) = if is_row {
+                        (full(k + 1, line), full(k + 1, line + 1))
+                    } else {
+                        (full(line, k + 1), full(line + 1, k + 1))
+                    };
+                    here != there
+                };
+                let mut k = 0;
+                while k < along {
+                    let begin = k;
+                    while k < along && differs(k) {
+                        k += 1;
+                    }
+                    if k > begin {
+                        if is_row {
+                            face([begin, line], [k, line]);
+                        } else {
+                            face([line, begin], [line, k]);
+                        }
+                    }
+                    k += 1;
+                }
+            }
+        }
+        world
+    }
+
+    /// Adds all that another world holds.
+    pub fn add(&mut self, other: Self) {
+        self.segments.extend(other.segments);
+        self.circles.extend(other.circles);
     }
 
     /// Adds one straight face.
