@@ -5,6 +5,7 @@ pub mod picture;
 pub mod relations;
 pub mod scene;
 pub mod score;
+pub mod terminal;
 pub mod track;
 
 pub use beamfix_app::hash;

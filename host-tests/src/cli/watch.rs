@@ -14,15 +14,14 @@ use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::ld06::Sensor;
 use host_tests::board::{Board, commands::Commands, stream::Stream};
 use host_tests::report::picture::{self, Kind};
+use host_tests::report::terminal::View;
 use host_tests::watch::Watch;
 use serde_json::json;
 
 use super::output;
 
-/// Follow a board by its telemetry: a picture that is drawn again and again, a line on stderr, and, where the board sends
-/// it, a recording of the lidar's bytes that `replay` reads.
-///
-/// A serial line must have been set up: stty -F /dev/ttyACM0 raw 921600.
+/// Follow a board by its telemetry: a picture that is drawn again and again, in the terminal too (a line where there is
+/// none), and, where the board sends it, a recording of the lidar's bytes that `replay` reads.
 #[derive(clap::Args)]
 pub struct Args {
     /// Where the frames come from: a file or a serial line, `tcp:HOST:PORT`, or `-` for standard input.
@@ -46,6 +45,12 @@ pub struct Args {
     /// Ask the board how good each match was and write it here: a line of CSV for each.
     #[arg(long, value_name = "FILE")]
     quality: Option<PathBuf>,
+    /// Print a line instead of drawing in the terminal.
+    #[arg(long)]
+    plain: bool,
+    /// The serial line's speed.
+    #[arg(long, value_name = "BAUD", default_value_t = 921_600)]
+    baud: u32,
     /// Give up where nothing comes over TCP for so long.
     #[arg(long, value_name = "S", default_value_t = 10.0)]
     timeout: f64,
@@ -86,6 +91,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         watch: Watch::new(recording, qualities)?,
         drawn: Instant::now(),
         silent: false,
+        view: if args.plain { None } else { View::open() },
     };
     if let Some(folder) = args.out.parent() {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
@@ -103,16 +109,21 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 live.ask(&mut commands);
                 live.follow(stream, source)?;
             }
-            None => {
-                let file = File::open(source).with_context(|| source.to_owned())?;
-                // A serial line takes commands too; a file does not.
-                if !file.metadata()?.is_file()
-                    && let Ok(mut commands) = File::options().append(true).open(source)
-                {
-                    live.ask(&mut commands);
+            None => match line(source, args.baud)? {
+                Line::Serial(mut port) => {
+                    live.ask(&mut port);
+                    live.follow(port, source)?;
                 }
-                live.follow(file, source)?;
-            }
+                Line::File(file) => {
+                    // A pipe may take commands too; a file does not.
+                    if !file.metadata()?.is_file()
+                        && let Ok(mut commands) = File::options().append(true).open(source)
+                    {
+                        live.ask(&mut commands);
+                    }
+                    live.follow(file, source)?;
+                }
+            },
         },
         (None, None) => bail!("neither a source nor a board"),
     }
@@ -125,6 +136,8 @@ struct Live<'a> {
     drawn: Instant,
     /// Nothing came for as long as one waits.
     silent: bool,
+    /// The terminal, where there is one.
+    view: Option<View>,
 }
 
 impl Live<'_> {
@@ -240,7 +253,9 @@ impl Live<'_> {
     fn show(&mut self) -> Result<()> {
         if self.drawn.elapsed().as_secs_f64() >= self.args.every {
             self.draw()?;
-            eprintln!("{}", self.watch.status());
+            if self.view.is_none() {
+                eprintln!("{}", self.watch.status());
+            }
         }
         Ok(())
     }
@@ -256,8 +271,12 @@ impl Live<'_> {
                 Kind::Png => "next.png",
                 Kind::Svg => "next.svg",
             });
-        picture::save(&self.watch.map(&title), &next)?;
+        let map = self.watch.map(&title);
+        picture::save(&map, &next)?;
         replace(&next, &self.args.out)?;
+        if let Some(view) = &mut self.view {
+            view.draw(&map).context("the terminal")?;
+        }
         self.drawn = Instant::now();
         Ok(())
     }
@@ -278,6 +297,9 @@ impl Live<'_> {
             );
         }
         self.draw()?;
+        if let Some(view) = self.view.take() {
+            view.close();
+        }
         let watch = &self.watch;
         let counters = watch.counters();
         let value = json!({
@@ -296,6 +318,25 @@ impl Live<'_> {
         }
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// Where frames come from that is no network.
+enum Line {
+    Serial(Box<dyn serialport::SerialPort>),
+    File(File),
+}
+
+/// Opens a serial line at its speed, or a file.
+fn line(source: &str, baud: u32) -> Result<Line> {
+    /// Nothing comes for so long where nothing is wrong: a board is silent while it starts.
+    const PATIENCE: Duration = Duration::from_secs(3600);
+    let is_file = fs::metadata(source).is_ok_and(|data| data.is_file());
+    if !is_file && let Ok(port) = serialport::new(source, baud).timeout(PATIENCE).open() {
+        return Ok(Line::Serial(port));
+    }
+    // A pipe, or a terminal that is no serial line.
+    let file = File::open(source).with_context(|| source.to_owned())?;
+    Ok(Line::File(file))
 }
 
 /// A connection to the first address that answers in time.

@@ -41,7 +41,7 @@ const HEADER: u32 = 116;
 
 impl Map {
     /// Corners of what the picture shows: the world and the points, the paths where there is neither.
-    fn limits(&self) -> ([f64; 2], [f64; 2]) {
+    pub(crate) fn limits(&self) -> ([f64; 2], [f64; 2]) {
         let corners = self
             .world
             .iter()
