@@ -4,9 +4,8 @@
 # A pose graph's file says which pose is held with a line `FIX 0`, and g2o itself writes it right behind that pose, before
 # the other poses and all edges. The guess before running it: readG2o skips a line that it does not know, as it does with
 # landmarks (EDGE_SE2_XY) and parameters, and keeps all edges.
-# Seen: all poses are read and none of the edges behind the line. No error, and the optimizer is content: a graph without
-# edges has nothing to improve. A comment that starts with # does the same; a FIX line with two numbers does not, nor does
-# FIX in a 3-D file.
+# Seen: all poses are read and none of the edges behind the line. No error, no warning. A comment that starts with # does
+# the same; a FIX line with two numbers does not, nor does FIX in a 3-D file.
 # For who checks SLAM by GTSAM: count the factors against the file's EDGE lines, or take FIX and comments out first.
 set -euo pipefail
 folder=$(mktemp -d)
