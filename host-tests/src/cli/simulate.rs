@@ -5,17 +5,19 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use beamfix::geometry::Pose;
+use beamfix::grid::occupancy;
 use beamfix::odometry::{Odometry, Refusal, Step};
 use beamfix::pipeline::Estimator;
 use beamfix::scan::Mount;
 use beamfix_sim::encoder;
 use beamfix_sim::lidar::Ranging;
+use beamfix_sim::place::{self, Place};
 use beamfix_sim::ring::{Ring, RingModel};
-use beamfix_sim::{Drive, Moment, Settings};
+use beamfix_sim::{Drive, Moment, Settings, World};
 use host_tests::decode;
-use host_tests::formats::bytes::Content;
+use host_tests::formats::bytes::{self, Content};
 use host_tests::formats::capture::{log, simulated};
 use host_tests::formats::carmen;
 use host_tests::formats::ros::bag::ATTACHMENT;
@@ -30,7 +32,7 @@ use super::output;
 use super::prior::Prior;
 use host_tests::report::track::{At, Track};
 
-/// Drive a simulated robot through a flat: ray casting, lidar bytes, driver, matcher, pose.
+/// Drive a simulated robot through a flat or another place: ray casting, lidar bytes, driver, matcher, pose.
 #[derive(clap::Args)]
 pub struct Args {
     /// Where to write map.png, errors.svg, trajectory.txt, truth.txt, run.mcap, and lidar.rec or ring.log for `replay`.
@@ -42,13 +44,17 @@ pub struct Args {
     /// The lidar on board: a name that `lidars` lists, or vl53l5cx-ring, eight rangers of eight zones around the robot.
     #[arg(long, value_name = "MODEL", default_value = "ld06")]
     lidar: String,
+    /// Where the robot drives: flat, room, corridor, office, hall, aisles, yard, maze; or a file that describes a place
+    /// (walls, boxes, columns, a drawing, a ROS map, a start and a way: host-tests/sim/worlds has some).
+    #[arg(long, value_name = "NAME|FILE", default_value = "flat")]
+    world: String,
     /// Where the guess for each match comes from: the simulated wheels' odometry, or the last velocity.
     #[arg(long, value_enum, default_value_t = Prior::Odometry)]
     prior: Prior,
-    /// Stop after so many seconds; the round takes about 70.
+    /// Stop after so many seconds; the round through the flat takes about 70.
     #[arg(long, default_value_t = Settings::DEFAULT.seconds)]
     seconds: f64,
-    /// Write the flat as a ROS map too: this YAML file, and a PGM picture beside it. `field` makes a likelihood field
+    /// Write the place as a ROS map too: this YAML file, and a PGM picture beside it. `field` makes a likelihood field
     /// of it, and `replay --mode localize --map FILE` finds the robot in it.
     #[arg(long, value_name = "FILE.yaml")]
     ros_map: Option<PathBuf>,
@@ -84,7 +90,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         },
         ..settings
     };
-    let drive = beamfix_sim::drive(&settings, encoder::for_model(model).as_mut());
+    let drive = beamfix_sim::drive_in(place(args)?, &settings, encoder::for_model(model).as_mut());
     let (bytes, revolutions, summary) = simulated::capture(&drive, settings.mount, model)?;
     let path = args.out.join(RECORDING);
     fs::write(&path, &bytes).with_context(|| path.display().to_string())?;
@@ -108,6 +114,45 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         packets: summary.packets,
     };
     sized!(size, turning(args, &settings, run))
+}
+
+/// Where the robot drives: a place that is built in, or described in a file.
+fn place(args: &Args) -> Result<Place> {
+    if let Some(place) = Place::named(&args.world, args.seed) {
+        return Ok(place);
+    }
+    let path = Path::new(&args.world);
+    let known = || {
+        let names = place::NAMES.map(|(name, what)| format!("{name} ({what})"));
+        format!(
+            "--world {}: a file, or one of {}",
+            args.world,
+            names.join(", ")
+        )
+    };
+    let content = bytes::load_at_most(path, MAX_WORLD).with_context(known)?;
+    let text = String::from_utf8(content.bytes).with_context(known)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut read_map = |name: &str| {
+        let map = ros_map::read(&folder.join(name)).map_err(|error| format!("{error:#}"))?;
+        Ok(walls(&map))
+    };
+    Place::parse(&text, &mut read_map).map_err(|why| anyhow!("{}: {why}", args.world))
+}
+
+/// Largest description of a place (bytes).
+const MAX_WORLD: u64 = 4 << 20;
+
+/// The faces of a map's occupied cells.
+fn walls(map: &ros_map::Map) -> World {
+    let shape = map.shape();
+    let origin = shape.origin().into();
+    let is_full = |x: usize, y: usize| {
+        let byte = map.get(x as i32, y as i32);
+        byte.is_some_and(occupancy::is_occupied)
+    };
+    let cells = (usize::from(shape.width()), usize::from(shape.height()));
+    World::of_cells(cells, f64::from(shape.resolution()), origin, &is_full)
 }
 
 /// The name of the ring of rangers, which has no bytes and so is no model.
@@ -144,7 +189,7 @@ fn ring(args: &Args, settings: Settings) -> Result<ExitCode> {
         ..settings
     };
     let mut ring = Ring::new(RingModel::VL53L5CX, args.seed);
-    let drive = beamfix_sim::drive(&settings, &mut ring);
+    let drive = beamfix_sim::drive_in(place(args)?, &settings, &mut ring);
     let log = simulated::ring(&drive, &ring, settings.mount);
     let moments = ring.scans.iter().map(|scan| drive.moments[scan.0 - 1]);
     let moments = moments.collect();
@@ -258,8 +303,13 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
         errors.largest.1
     );
     let title = format!(
-        "beamfix: {} in the simulated flat, seed {}",
-        args.lidar, args.seed
+        "beamfix: {} in the simulated {}, seed {}",
+        args.lidar,
+        Path::new(&args.world)
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy(),
+        args.seed
     );
     let map = track.map(title.clone(), caption.clone(), Some(drive.world));
     picture::save(&map, &args.out.join("map.png"))?;
@@ -267,7 +317,7 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
 
     let (scans, lost) = (followed.scans, lost(&followed.estimator));
     let value = json!({
-        "lidar": args.lidar, "seed": args.seed,
+        "lidar": args.lidar, "world": args.world, "seed": args.seed,
         "final_error_m": errors.last.0, "final_error_deg": errors.last.1,
         "max_error_m": errors.largest.0, "max_error_deg": errors.largest.1,
         "wheels_error_m": errors.wheels.0, "wheels_error_deg": errors.wheels.1,

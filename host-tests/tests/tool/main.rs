@@ -9,3 +9,4 @@ mod regress;
 mod scenes;
 mod tuning;
 mod watch;
+mod worlds;

@@ -1,0 +1,54 @@
+//! `simulate --world`: places that are built in, described in a text, or taken from a ROS map.
+
+use std::fs;
+
+use crate::common::tool::{beamfix, folder, json, text};
+
+#[test]
+fn a_maps_walls_are_a_place_to_drive_in() {
+    let folder = folder("worlds");
+    let map = folder.join("flat.yaml");
+    let out = folder.join("out");
+    let written = [
+        "simulate",
+        "--seconds",
+        "2",
+        "--out",
+        text(&out),
+        "--ros-map",
+        text(&map),
+    ];
+    assert!(beamfix(&written).status.success());
+    // The same room of the same flat, by its walls and by the cells of its map.
+    let place = folder.join("place.txt");
+    let description =
+        "ros-map flat.yaml  # 5 cm a cell\nstart 5.2 2.6 160\nway 3.3 2.6  3.05 4.15\n";
+    fs::write(&place, description).expect("the description");
+    let run = beamfix(&[
+        "simulate",
+        "--world",
+        text(&place),
+        "--out",
+        text(&out),
+        "--json",
+    ]);
+    let value = json(&run);
+    let off = value["final_error_m"].as_f64().expect("an error");
+    assert!(off < 0.03 && value["refused"] == 0, "{value}");
+    let driven = value["distance_m"].as_f64().expect("a distance");
+    assert!((3.0..4.5).contains(&driven), "{value}");
+}
+
+#[test]
+fn a_place_that_is_not_there_is_refused_with_those_that_are() {
+    let folder = folder("worlds-bad");
+    let path = folder.join("place.txt");
+    fs::write(&path, "wall 0 0 4 0\nstart 1 1 0\nway 1 -1\n").expect("the description");
+    for (world, words) in [("moon", "aisles"), (text(&path), "comes within")] {
+        let out = folder.join("out");
+        let run = beamfix(&["simulate", "--world", world, "--out", text(&out)]);
+        let said = String::from_utf8_lossy(&run.stderr);
+        assert_eq!(run.status.code(), Some(2), "{said}");
+        assert!(said.contains(words), "{said}");
+    }
+}
