@@ -3,5 +3,6 @@
 mod cross;
 mod header;
 mod host;
+mod localize;
 mod packages;
 mod tools;

@@ -1,6 +1,10 @@
 //! The C example built by the microcontrollers' compilers, on the emulated boards: the host's poses.
 
-use std::{fs, path::Path, process::Command};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
 use host_tests::board::BOARDS as EMULATED;
 use object::{Object as _, ObjectSection as _, SectionKind};
@@ -10,7 +14,7 @@ use super::tools::{archive, folder, has, run, sources};
 
 /// A compiler and the machine that runs what it makes.
 pub struct Board {
-    name: &'static str,
+    pub name: &'static str,
     target: &'static str,
     compiler: &'static str,
     flags: &'static [&'static str],
@@ -59,8 +63,8 @@ pub const BOARDS: [Board; 4] = [
 ];
 
 impl Board {
-    /// Compiles the example; `None` where a tool is missing.
-    fn compile(&self, into: &Path) -> Option<std::path::PathBuf> {
+    /// Compiles an example; `None` where a tool is missing.
+    pub fn compile(&self, into: &Path, example: &[&Path]) -> Option<PathBuf> {
         let emulator = self.emulator.first()?;
         if !has(self.compiler) || !has(emulator) {
             println!("left out: the C example on {}", self.name);
@@ -79,7 +83,7 @@ impl Board {
             .args(["-Wall", "-Wextra", "-Werror"])
             .arg("-I")
             .arg(sources().join("include"))
-            .arg(sources().join("examples/replay.c"))
+            .args(example)
             .arg(sources().join("emulated/platform_qemu.c"))
             .arg(archive(self.target))
             .arg("-lgcc")
@@ -89,7 +93,8 @@ impl Board {
             .arg(format!("-Wl,--defsym=RAM_START={}", self.ram.0))
             .arg(format!("-Wl,--defsym=RAM_BYTES={}", self.ram.1))
             .arg("-o")
-            .arg(&program));
+            .arg(&program)
+            .current_dir(into));
         Some(program)
     }
 }
@@ -105,7 +110,7 @@ fn the_c_example_finds_the_hosts_poses_on_every_core() {
     fs::write(folder.join("input.bin"), &bytes).expect("the capture");
     let expected = expected(&bytes);
     for board in &BOARDS {
-        let Some(program) = board.compile(&folder) else {
+        let Some(program) = board.compile(&folder, &[&sources().join("examples/replay.c")]) else {
             continue;
         };
         assert_eq!(
@@ -164,7 +169,7 @@ fn the_c_example_is_at_most_4_kb_larger_than_the_same_calls_in_rust() {
         else {
             continue;
         };
-        let Some(program) = board.compile(&folder) else {
+        let Some(program) = board.compile(&folder, &[&sources().join("examples/replay.c")]) else {
             continue;
         };
         let rust = rust
