@@ -43,8 +43,12 @@ impl Gap {
         );
         let (dx, dy) = (u64::from(dx.unsigned_abs()), u64::from(dy.unsigned_abs()));
         let turn = turn_between(a, b);
+        // First, for wider angles overflow what follows.
+        if turn > self.widest {
+            return false;
+        }
         let allowed = u64::from(self.mm + self.slope * across_mm(nearer(a, b), turn));
-        turn <= self.widest && dx * dx + dy * dy <= allowed * allowed
+        dx * dx + dy * dy <= allowed * allowed
     }
 
     /// Number of points from the first on of which each lies on one surface with the next, by the distance between them.
@@ -151,6 +155,20 @@ mod tests {
 
     fn at(turn: u16, mm: u16) -> ScanPoint {
         ScanPoint::at(Bearing(turn), mm)
+    }
+
+    #[test]
+    fn points_whose_fields_contradict_each_other_are_no_surface_and_do_not_overflow() {
+        let far = |turn: u16, x: i16| ScanPoint {
+            x,
+            y: i16::MIN,
+            bearing: Bearing(turn),
+            range: u16::MAX,
+        };
+        for turn in [0u16, 1000, 1001, 20_000, 32_768, 65_000] {
+            let (a, b) = (far(0, i16::MIN), far(turn, i16::MAX));
+            assert!(!Gap::WALL.joins_points(&a, &b), "{turn}");
+        }
     }
 
     #[test]

@@ -1,9 +1,6 @@
 //! Beams as wide as the gap to the next one: a ring of multi-zone rangers.
 
-use super::{
-    Beam, Bearing, ScanPoint,
-    surface::{across_mm, turn_between},
-};
+use super::{Beam, Bearing, ScanPoint, surface::turn_between};
 use crate::math;
 
 /// Where a beam's nearest surface lies, which is what a ranger of wide beams reports.
@@ -41,7 +38,8 @@ pub(crate) fn surface(
         (None, None) => 0,
     };
     // r(θ) = d / cos(θ − φ): the slope over the range is the tangent of θ − φ.
-    let across = across_mm(range, width) as i32;
+    // As `across_mm`, for wider beams than its 32 bits hold.
+    let across = ((u64::from(range) * u64::from(width) * 25) >> 18) as i32;
     let off = math::atan2_turn(-slope, across.max(1)).cast_signed();
     let half = (width / 2).cast_signed();
     let off = off.clamp(-half, half);
@@ -62,7 +60,7 @@ mod tests {
             let nearest = |middle: f32| {
                 let off = (middle - foot).abs();
                 let off = if off > edge { off - edge } else { 0.0 };
-                1.0 / off.cos()
+                1.0 / math::sin_cos(off).1
             };
             let beam = |k: f32| Beam {
                 bearing: Bearing::from_radians(2.0 * edge * k),

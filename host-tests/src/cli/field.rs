@@ -8,8 +8,9 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, ensure};
 use beamfix::grid::occupancy::{self, Cell};
 use beamfix::matching::correlative::pyramid::Pyramid;
-use beamfix::sensor_model::likelihood_field::{FieldModel, LikelihoodField, stored};
+use beamfix::sensor_model::likelihood_field::{FieldModel, stored};
 use host_tests::formats::{field::of_map, ros_map};
+use host_tests::report::picture::{self, heat::Heat};
 use serde_json::json;
 
 use super::output;
@@ -47,11 +48,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         args.out.display()
     );
     let code = args.out.with_extension("rs");
-    let picture = args.out.with_extension("png");
-    output::spare(
-        &[&args.map],
-        &[Some(&args.out), Some(&code), Some(&picture)],
-    )?;
+    let image = args.out.with_extension("png");
+    output::spare(&[&args.map], &[Some(&args.out), Some(&code), Some(&image)])?;
     let mut remarks = Vec::new();
     let map = ros_map::read_remarking(&args.map, &mut remarks)?;
     output::remark(&remarks);
@@ -74,7 +72,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     file.flush()
         .with_context(|| args.out.display().to_string())?;
     write_const(&header, field.grid().cells(), &code)?;
-    heat_map(&field, &picture)?;
+    let heat = Heat {
+        title: format!("Likelihood field of {}", args.map.display()),
+        caption: format!(
+            "{} x {} cells of {} m, sigma {} m",
+            shape.width(),
+            shape.height(),
+            shape.resolution(),
+            args.sigma
+        ),
+        field: &field,
+    };
+    picture::save(&heat, &image)?;
     let count = |cell: Cell| {
         map.cells()
             .iter()
@@ -85,13 +94,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let value = json!({
         "width": shape.width(), "height": shape.height(), "resolution": shape.resolution(), "flash_bytes": bytes,
         "ram_bytes": ram, "occupied": occupied, "free": count(Cell::Free), "unknown": unknown,
-        "files": [args.out, code, picture],
+        "files": [args.out, code, image],
     });
     let text = format!(
         "{occupied} cells occupied, {unknown} unknown\nwrote {}, {} and {}",
         args.out.display(),
         code.display(),
-        picture.display()
+        image.display()
     );
     output::report(args.json, &value, &text)?;
     if occupied == 0 {
@@ -119,26 +128,4 @@ fn write_const(header: &[u8], cells: &[u8], path: &std::path::Path) -> Result<()
     }
     text.push_str("];\n");
     std::fs::write(path, text).with_context(|| path.display().to_string())
-}
-
-/// Cells from black over red to white as a beam likes to end there; blue-grey where nothing is explored.
-fn heat_map(field: &LikelihoodField<Vec<u8>>, path: &std::path::Path) -> Result<()> {
-    let shape = field.grid().shape();
-    let unexplored = stored::header(&field.as_slice())[5];
-    let (width, height) = (u32::from(shape.width()), u32::from(shape.height()));
-    let picture = image::RgbImage::from_fn(width, height, |x, y| {
-        let byte = field
-            .grid()
-            .get(x as i32, (height - 1 - y) as i32)
-            .unwrap_or(unexplored);
-        image::Rgb(if byte == unexplored {
-            [90, 100, 120]
-        } else {
-            let part = |from: i32| ((i32::from(byte) - from) * 3).clamp(0, 255) as u8;
-            [part(0), part(85), part(170)]
-        })
-    });
-    picture
-        .save(path)
-        .with_context(|| path.display().to_string())
 }

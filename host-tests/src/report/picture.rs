@@ -3,6 +3,7 @@
 pub mod axes;
 pub mod chart;
 pub mod density;
+pub mod heat;
 pub mod map;
 pub mod pair;
 

@@ -40,7 +40,20 @@ fn a_map_becomes_a_table_for_flash() {
         "the const is not the table"
     );
     let picture = image::open(folder.join("home.png")).expect("a picture");
-    assert_eq!((picture.width(), picture.height()), (400, 320));
+    // With axes and a legend, 20 m by 16 m at one scale; surfaces glow, and what is unexplored is grey.
+    assert_eq!(picture.width(), 1500);
+    assert!(
+        (1100..1500).contains(&picture.height()),
+        "{}",
+        picture.height()
+    );
+    let picture = picture.to_rgb8();
+    let unexplored = |[r, g, b]: [u8; 3]| [r, g, b] == [90, 100, 120];
+    let nothing_near = |[r, g, b]: [u8; 3]| r < 60 && g == 0 && b == 0;
+    let surface = |[r, g, b]: [u8; 3]| r == 255 && g == 255 && (100..255).contains(&b);
+    let count = |is: &dyn Fn([u8; 3]) -> bool| picture.pixels().filter(|p| is(p.0)).count();
+    let counts = [count(&unexplored), count(&nothing_near), count(&surface)];
+    assert!(counts.iter().all(|count| *count > 2000), "{counts:?}");
 }
 
 #[test]

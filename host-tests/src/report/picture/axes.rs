@@ -78,14 +78,10 @@ where
     let mut chart = builder
         .build_cartesian_2d(x.clone(), y.clone())
         .map_err(fail)?;
-    let span = x.end - x.start;
-    let digits = if span < 0.05 {
-        4
-    } else if span < 0.5 {
-        3
-    } else {
-        1
-    };
+    // As many digits as two labels need to differ.
+    let labels = (plot.0 as usize / 110, plot.1 as usize / 90);
+    let step = (x.end - x.start) / labels.0.max(1) as f64;
+    let digits = libm::ceil(-libm::log10(step.max(1e-9))).max(1.0) as usize;
     // A rounding error below zero would be written as -0.
     let label = |value: &f64| format!("{:.digits$}", if value.abs() < 1e-9 { 0.0 } else { *value });
     chart
@@ -98,8 +94,8 @@ where
         .y_label_formatter(&label)
         .light_line_style(TRANSPARENT)
         .bold_line_style(RGBColor(228, 228, 228))
-        .x_labels(plot.0 as usize / 110)
-        .y_labels(plot.1 as usize / 90)
+        .x_labels(labels.0)
+        .y_labels(labels.1)
         .draw()
         .map_err(fail)?;
     Ok((chart, [x, y]))

@@ -38,6 +38,8 @@ pub struct Map {
 
 const WIDTH: u32 = 1500;
 const HEADER: u32 = 116;
+/// Fewer points are drawn large.
+const FEW: usize = 4000;
 
 impl Map {
     /// Corners of what the picture shows: the world and the points, the paths where there is neither.
@@ -90,12 +92,18 @@ impl Drawing for Map {
 
         let (low, high) = self.limits();
         let (mut chart, limits) = metres(&body, low, high, "")?;
+        // A few scans are hardly seen as thinly as many are drawn.
+        let (size, weight) = if self.points.len() < FEW {
+            (3, 0.9)
+        } else {
+            (1, 0.35)
+        };
         dots(
             &mut chart,
             &limits,
             self.points.iter().copied(),
-            1,
-            colour::POINTS.mix(0.35).filled(),
+            size,
+            colour::POINTS.mix(weight).filled(),
         )?;
         if let Some(world) = &self.world {
             for face in &world.segments {

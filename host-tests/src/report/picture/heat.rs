@@ -1,0 +1,95 @@
+//! A likelihood field seen from above.
+
+use anyhow::Result;
+use beamfix::geometry::Point;
+use beamfix::sensor_model::likelihood_field::{LikelihoodField, stored};
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use super::Drawing;
+use super::axes::{fail, header, metres};
+
+/// What to draw.
+pub struct Heat<'a> {
+    /// Title line.
+    pub title: String,
+    /// Line under the title.
+    pub caption: String,
+    /// The field, in its map's frame.
+    pub field: &'a LikelihoodField<Vec<u8>>,
+}
+
+const WIDTH: u32 = 1500;
+const HEADER: u32 = 116;
+/// Where nothing is explored.
+const UNEXPLORED: RGBColor = RGBColor(90, 100, 120);
+
+/// From black over red to white as a beam likes to end there.
+fn glow(byte: u8) -> RGBColor {
+    let part = |from: i32| ((i32::from(byte) - from) * 3).clamp(0, 255) as u8;
+    RGBColor(part(0), part(85), part(170))
+}
+
+impl Heat<'_> {
+    /// Corners of the box around the map (m): its own axes may be turned.
+    fn limits(&self) -> ([f64; 2], [f64; 2]) {
+        let shape = self.field.grid().shape();
+        let side = |cells: u16| f32::from(cells) * shape.resolution();
+        let (width, height) = (side(shape.width()), side(shape.height()));
+        let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
+        super::axes::bounds(corners.into_iter().map(|(x, y)| {
+            let corner = shape.origin() * Point::new(x, y);
+            [corner.x.into(), corner.y.into()]
+        }))
+    }
+}
+
+impl Drawing for Heat<'_> {
+    fn size(&self) -> (u32, u32) {
+        let (low, high) = self.limits();
+        let shape = (high[1] - low[1]) / (high[0] - low[0]).max(1e-6);
+        (
+            WIDTH,
+            (f64::from(WIDTH - 90) * shape.clamp(0.3, 1.5)) as u32 + 70 + HEADER,
+        )
+    }
+
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()>
+    where
+        B::ErrorType: 'static,
+    {
+        let (top, body) = area.split_vertically(HEADER);
+        let unexplored = stored::header(&self.field.as_slice())[5];
+        let legend = [
+            ("beams end here", glow(250), 12),
+            ("near a surface", glow(120), 12),
+            ("nothing near", glow(0), 12),
+            ("unexplored", UNEXPLORED, 12),
+        ];
+        header(&top, 70, &self.title, &self.caption, &legend)?;
+        let (low, high) = self.limits();
+        let (chart, [x_axis, y_axis]) = metres(&body, low, high, "")?;
+        let plot = chart.plotting_area();
+        let (width, height) = plot.dim_in_pixel();
+        let shape = self.field.grid().shape();
+        for row in 0..height {
+            for column in 0..width {
+                let along = |axis: &std::ops::Range<f64>, k: u32, of: u32| {
+                    axis.start + (axis.end - axis.start) * (f64::from(k) + 0.5) / f64::from(of)
+                };
+                let (x, y) = (along(&x_axis, column, width), along(&y_axis, row, height));
+                let (cell_x, cell_y) = shape.cell_of(Point::new(x as f32, y as f32));
+                let Some(byte) = self.field.grid().get(cell_x, cell_y) else {
+                    continue;
+                };
+                let colour = if byte == unexplored {
+                    UNEXPLORED
+                } else {
+                    glow(byte)
+                };
+                plot.draw_pixel((x, y), &colour).map_err(fail)?;
+            }
+        }
+        Ok(())
+    }
+}
