@@ -32,6 +32,7 @@
 //! | feature | what it adds |
 //! | --- | --- |
 //! | `embedded-io`, `embedded-io-async`, `embedded-hal-nb` | a lidar read over that crate's UART trait |
+//! | `embedded-storage` | a map saved in flash, with `internals` so far |
 //! | `defmt` | `defmt::Format` on the public types |
 //! | `modular` | ICP with every stage a choice, for study: what the fast one does, step by step |
 //! | `internals` | the workings, for this project's own tests; nothing in it is stable |

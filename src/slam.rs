@@ -8,13 +8,25 @@
 //! | solve the pose graph, loops weighted by how well they agree | `solver`, `graph` |
 //! | remove the keyframe that tells least where the memory is full | `room`, `pruning` |
 //! | draw the map from the keyframes | `rendering` |
+//! | save it in flash and go on with it | `flash`, `stored` |
 //!
 //! Odometry goes in with every scan ([`Slam::update`]); everything else is done in slices in the time between scans
 //! ([`Slam::step`]). Poses are given in the frame of a keyframe ([`Placed`]), since keyframes still move.
+//!
+//! The map is its keyframes, poses and scans of two bytes a point, and the motions measured between them. A scan of now is
+//! matched with what up to eight keyframes around a place saw, as one scan (see
+//! [`virtual_scan`](crate::matching::virtual_scan)): one keyframe alone overlaps too little where a lidar sees to one side
+//! only. Where the graph knows to 10 cm (σ) where the robot is, a match alone is a loop; elsewhere two others must close a
+//! cycle with it. Loops that contradict the rest later lose their weight in the solution (dynamic covariance scaling).
+//!
+//! What it does not do: scans that follow right after the robot was carried stand in a frame of before, doors that changed stay as the
+//! keyframes saw them, and a keyframe's covariance in the map is not computed.
 
 mod closing;
 mod config;
 mod drift;
+#[cfg(feature = "embedded-storage")]
+mod flash;
 pub mod graph;
 mod keeping;
 mod loops;
@@ -23,10 +35,14 @@ mod rendering;
 mod room;
 pub mod solver;
 mod store;
+#[cfg(feature = "embedded-storage")]
+mod stored;
 mod verify;
 mod work;
 
 pub use config::SlamConfig;
+#[cfg(feature = "embedded-storage")]
+pub use flash::StorageError;
 pub use pruning::Merged;
 
 use heapless::{Deque, Vec};

@@ -18,6 +18,8 @@ use crate::{
     },
 };
 
+/// Beams in the coarse passes of a search: with the usual 45 it is the longest piece of work by far, and finds no more.
+const SEARCH_BEAMS: u16 = 32;
 /// Matches of one place are not independent, and their errors larger than each tells by this factor (of σ²).
 const MATCH_INFLATION: f32 = 4.0;
 
@@ -77,6 +79,11 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
     fn matched(&self, guess: Pose, loose: bool) -> Option<Match> {
         let config = IcpConfig {
             search: if loose { Search::Global } else { Search::Local },
+            coarse_beams: if loose {
+                SEARCH_BEAMS
+            } else {
+                IcpConfig::DEFAULT.coarse_beams
+            },
             ..IcpConfig::DEFAULT
         };
         let found = align(&self.reference, &self.own, Pose::IDENTITY, &config).ok()?;

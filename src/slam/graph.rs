@@ -199,6 +199,28 @@ impl<const K: usize, const E: usize> Graph<K, E> {
         Some(slot)
     }
 
+    /// Number of the next node.
+    pub(super) const fn next_id(&self) -> u32 {
+        self.next_id
+    }
+
+    /// Puts a node where none is; whether that is a place.
+    pub(super) fn put(&mut self, slot: Slot, node: Node) -> bool {
+        match self.nodes.get_mut(usize::from(slot)) {
+            Some(free) if !free.used => {
+                *free = node;
+                self.used += 1;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Sets the number of the next node.
+    pub(super) const fn set_next_id(&mut self, next_id: u32) {
+        self.next_id = next_id;
+    }
+
     /// Adds an edge between two nodes; gives it back where there is no room, or it is none: from a node to itself, to a
     /// slot without a node, with a number that is not finite.
     ///

@@ -39,7 +39,10 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
             if points.len() < MIN_POINTS {
                 return None;
             }
-            let slot = self.keep(odometry, points)?;
+            let slot = match self.newest() {
+                None => self.keep(odometry, points)?,
+                Some(newest) => self.keep_again(newest, points)?,
+            };
             return self.now_at(slot, odometry, covariance);
         };
         let motion = last.odometry.between(odometry);
@@ -57,6 +60,35 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
             self.counters.no_room = self.counters.no_room.wrapping_add(1);
         }
         kept.or(Some(here))
+    }
+
+    /// The newest keyframe of a map that was loaded.
+    fn newest(&self) -> Option<Slot> {
+        let newest = self.graph.nodes().max_by_key(|(_, node)| node.id);
+        newest.map(|(slot, _)| slot)
+    }
+
+    /// Keeps the first keyframe after a map was loaded, about where the newest one is.
+    fn keep_again(&mut self, newest: Slot, points: &[ScanPoint]) -> Option<Slot> {
+        /// How far off the robot may have been put (m, rad).
+        const PUT: (f32, f32) = (1.0, 0.5);
+        if self.graph.edges_are_full() {
+            return None;
+        }
+        let slot = self.keep(self.graph.pose(newest)?, points)?;
+        let (far, turned) = (PUT.0 * PUT.0, PUT.1 * PUT.1);
+        let about = Covariance(Sym3::diagonal(far, far, turned));
+        let edge = Edge {
+            from: newest,
+            to: slot,
+            kind: Kind::Chain,
+            motion: Pose::IDENTITY,
+            information: about.information()?,
+        };
+        // There was room, and it is the first one that waits.
+        let _ = self.graph.join(edge);
+        let _ = self.fresh.push_back(slot);
+        Some(slot)
     }
 
     /// Keeps a keyframe with the edge to it from the last one; `None`, and nothing done, where there is no room.

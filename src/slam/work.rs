@@ -43,7 +43,7 @@ mod cost {
     pub const LOOK: u32 = 2_500;
     pub const SHOW: u32 = 10_000;
     pub const MEET: u32 = 6_000;
-    pub const MEET_LOOSE: u32 = 30_000;
+    pub const MEET_LOOSE: u32 = 25_000;
     pub const WEIGH: u32 = 7_000;
 }
 /// Keyframes looked at again between one new keyframe and the next.

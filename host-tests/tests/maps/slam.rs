@@ -4,3 +4,4 @@ mod building;
 mod drive;
 mod nonsense;
 mod solver;
+mod storage;
