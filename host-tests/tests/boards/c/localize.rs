@@ -1,8 +1,8 @@
-//! Localization from a table in flash, by the C example: moved by hand once, found again, with Rust's bits.
+//! Localization from a table in flash, by the C example: moved by hand once, found again, with Rust's bits, here and on emulated boards.
 
 use std::{
     fs::{self, File},
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::Command,
 };
 
@@ -18,6 +18,7 @@ use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::ld06::Sensor;
 use host_tests::{formats::ros_map, report::hash::PoseHash};
 
+use super::cross::{BOARDS, emulate};
 use super::tools::{archive, folder, has, run, sources};
 
 /// Beams and points of the C library's localization.
@@ -123,4 +124,26 @@ fn c_finds_the_pose_in_a_map_and_again_after_it_was_carried_away() {
         .output()
         .expect("it starts");
     assert_eq!(String::from_utf8_lossy(&output.stdout), expected);
+}
+
+#[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the library is always a release build"
+)]
+fn two_emulated_boards_find_it_in_a_map_in_flash_with_the_hosts_bits() {
+    let (folder, expected) = prepared("localize-cross");
+    let sources = ["localize.c", "table.S"].map(|name| sources().join("examples").join(name));
+    let sources: Vec<&Path> = sources.iter().map(PathBuf::as_path).collect();
+    // The map is larger than the smallest boards' flash.
+    for board in (BOARDS.iter()).filter(|board| matches!(board.name, "m4f" | "rv32")) {
+        if let Some(program) = board.compile(&folder, &sources) {
+            assert_eq!(
+                emulate(board, &program, &folder),
+                expected,
+                "{}",
+                board.name
+            );
+        }
+    }
 }
