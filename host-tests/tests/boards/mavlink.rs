@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use beamfix_app::{App, AppConfig, CONFIG, Output, mavlink, telemetry::Reset};
 use beamfix_sim::drive::{Settings, drive};
@@ -167,11 +167,16 @@ fn pymavlink_reads_what_the_emulated_board_sends() {
         let n = stream.read_for(&mut bytes, Duration::from_millis(100));
         sent.extend_from_slice(&bytes[..n.unwrap_or_else(|error| panic!("{error:#}"))]);
     }
+    // Until nothing but heartbeats comes: one a second, of 21 bytes.
+    let (mut since, mut before) = (Instant::now(), sent.len());
     loop {
-        let n = stream.read_for(&mut bytes, Duration::from_secs(2));
-        match n.unwrap_or_else(|error| panic!("{error:#}")) {
-            0 => break,
-            n => sent.extend_from_slice(&bytes[..n]),
+        let n = stream.read_for(&mut bytes, Duration::from_millis(500));
+        sent.extend_from_slice(&bytes[..n.unwrap_or_else(|error| panic!("{error:#}"))]);
+        if since.elapsed() >= Duration::from_secs(2) {
+            if sent.len() - before <= 4 * 21 {
+                break;
+            }
+            (since, before) = (Instant::now(), sent.len());
         }
     }
     let messages = parsed(&python, "m4f.mavlink", &sent);
