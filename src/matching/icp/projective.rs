@@ -21,11 +21,15 @@
 
 mod accumulate;
 mod line;
+mod line_fit;
 mod multistart;
 mod normals;
+mod range_noise;
 pub mod reference;
 mod score;
 mod smoothing;
+#[cfg(test)]
+mod tests;
 mod verdict;
 
 pub use line::Line;
@@ -35,10 +39,11 @@ use crate::{
     config::{self, ConfigError},
     geometry::Pose,
     matching::{Match, MatchError},
+    math,
     scan::ScanPoint,
 };
-use accumulate::{FixedPose, Pass, Sums};
-use multistart::Candidate;
+use accumulate::{FixedPose, Gate, Pass, Sums};
+use multistart::{Candidate, Refined};
 
 /// How far the guess may be off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -131,19 +136,22 @@ impl Default for IcpConfig {
     }
 }
 
-/// Gate of the first coarse pass (see [`Pass::gate`]), and most of them.
-const COARSE_FIRST: u8 = 9;
+/// Width of the first coarse pass's gate (mm), and most coarse passes.
+const COARSE_FIRST: u32 = 2048;
 const COARSE_MOST: u8 = 16;
-/// A step that is this short compared with the gate narrows it by two, or by one.
+/// A step that is this short compared with the gate narrows it to a quarter, or to half.
 const SHORT: f32 = 1.0 / 16.0;
 const MEDIUM: f32 = 1.0 / 4.0;
-/// Gate of the fine passes, into how many parts they divide the points, points of a part in a row, and most passes.
-const FINE: u8 = 5;
-const PARTS: u16 = 2;
-const PART: u16 = 8;
+/// Width of the last gate in fifths of a standard deviation of a range: half weight at 2 of them.
+const FINE_FIFTHS: u32 = 64;
+/// Most passes over all points. Those of recorded scans need 2 to 8.
 const FINE_MOST: u8 = 16;
-/// A step this short (m) leaves the points on their lines.
-const STILL: f32 = 0.014;
+/// A match has converged when its last step, on all points, is shorter than this share of the standard deviation that its
+/// covariance tells: what is left of the way then is about as long, and adds a twentieth to the error.
+/// After the last pass twice as much is let pass: points that change between two lines lead to and fro for ever.
+const CONVERGED: f32 = 0.3;
+/// Points that decide what a converged pose is worth, about.
+const JUDGED: u16 = 120;
 
 /// Pose of the lidar that saw `points` in the frame of the one that saw `reference`.
 ///
@@ -211,6 +219,7 @@ pub fn align_observed<const N: usize>(
         points,
         start,
         lever_shift: accumulate::lever_shift(points, start),
+        sigma: u32::from(reference.sigma()),
         config,
     };
     let best = multistart::search(&task, &mut observe)?;
@@ -218,7 +227,7 @@ pub fn align_observed<const N: usize>(
 }
 
 /// Moves `points`, seen at `pose` in the reference's frame, towards the surfaces that the reference saw there, if they are
-/// less than 32 mm off: laid as the next reference, they know what this one knew.
+/// less than about three standard deviations of a range off: laid as the next reference, they know what this one knew.
 ///
 /// For poses of matches without a degenerate direction: along one, surfaces would be passed on to the wrong place. Costs a pass
 /// over the points; at a pose that is not finite or more than 27 m away they stay as they are.
@@ -228,16 +237,52 @@ pub fn smooth_towards<const N: usize>(
     pose: Pose,
 ) {
     if let Some(at) = FixedPose::new(pose) {
-        smoothing::smooth_towards(reference.lines(), points, at);
+        let sigma = u32::from(reference.sigma());
+        smoothing::smooth_towards(reference.lines(), points, at, sigma);
     }
 }
 
-/// A pass and the step it led to.
+/// A pass and the Gauss–Newton step it led to.
 struct Stepped {
+    /// Where the step leads.
     at: FixedPose,
+    /// The step: see [`FixedPose::moved`].
+    by: [f32; 3],
     sums: Sums,
     /// Length of the step (m): see [`accumulate::length`].
     length: f32,
+    /// The same in standard deviations of the pose.
+    sigmas: f32,
+}
+
+/// How much of a Gauss–Newton step is made: weights and lines that change with the pose make it too short or too long.
+struct Pace {
+    share: f32,
+    last: [f32; 3],
+}
+
+impl Pace {
+    const fn new() -> Self {
+        Self {
+            share: 1.0,
+            last: [0.0; 3],
+        }
+    }
+
+    /// More of a step that leads on as the last one did, less of one that leads back.
+    fn adapted(&mut self, [x, y, turn]: [f32; 3]) -> [f32; 3] {
+        // 3 m in 1/16 mm.
+        const LEVER: f32 = 48_000.0;
+        let [lx, ly, lt] = self.last;
+        let along = x * lx + y * ly + LEVER * LEVER * turn * lt;
+        self.last = [x, y, turn];
+        if along > 0.0 {
+            self.share = math::min(1.4 * self.share, 2.0);
+        } else if along < 0.0 {
+            self.share = math::max(0.5 * self.share, 0.25);
+        }
+        [x, y, turn].map(|v| self.share * v)
+    }
 }
 
 /// What stays the same over one match.
@@ -246,32 +291,45 @@ struct Task<'a> {
     points: &'a [ScanPoint],
     start: FixedPose,
     lever_shift: u32,
+    /// Standard deviation of a range (mm).
+    sigma: u32,
     config: &'a IcpConfig,
 }
 
 impl Task<'_> {
-    /// A pass, what earlier ones knew, and the Gauss–Newton step of both.
-    fn step(
-        &self,
-        at: FixedPose,
-        pass: Pass,
-        earlier: Option<&Sums>,
-    ) -> Result<Stepped, MatchError> {
-        let mut sums = accumulate::run(self.lines, self.points, at, self.lever_shift, pass);
+    /// Width of the last gate (mm).
+    fn fine_width(&self) -> u32 {
+        self.sigma * FINE_FIFTHS / 5
+    }
+
+    /// A pass over all points by the last gate.
+    fn all(&self) -> Pass {
+        Pass {
+            period: 1,
+            first: 0,
+            length: 1,
+            gate: Gate::new(self.fine_width()),
+        }
+    }
+
+    /// A pass and its Gauss–Newton step.
+    fn step(&self, at: FixedPose, pass: Pass) -> Result<Stepped, MatchError> {
+        let sums = accumulate::run(self.lines, self.points, at, self.lever_shift, pass);
         // Half of the share of the points that the pass looked at.
         let needed = self.config.min_inliers * pass.length / pass.period.max(1) / 2;
         if sums.inliers < needed {
             let found = sums.inliers;
             return Err(MatchError::TooFewCorrespondences { found, needed });
         }
-        if let Some(earlier) = earlier {
-            sums.remember(earlier);
-        }
         let step = sums.step(self.lever_shift).ok_or(MatchError::Degenerate)?;
+        let noise = math::max(sums.residual(), self.config.min_range_sigma) * 1e3;
+        let variance = sums.inflation() * noise * noise;
         Ok(Stepped {
-            at: at.moved(step, self.start),
+            at: at.moved(step.by, self.start),
+            by: step.by,
             sums,
-            length: accumulate::length(step),
+            length: accumulate::length(step.by),
+            sigmas: math::sqrt(math::max(step.gain, 0.0) / variance),
         })
     }
 
@@ -283,70 +341,75 @@ impl Task<'_> {
     ) -> Result<Candidate, MatchError> {
         let beams = self.config.coarse_beams.max(1);
         let period = (self.points.len() as u16).div_ceil(beams).max(1);
+        let least = self.fine_width();
         let mut at = start;
-        let mut gate = COARSE_FIRST;
+        let mut width = COARSE_FIRST.max(least);
         let mut passes = 0;
-        while gate > FINE && passes < COARSE_MOST {
+        while passes < COARSE_MOST {
             let pass = Pass {
                 period,
                 // Another set of points each time.
                 first: u16::from(passes) % period,
                 length: 1,
-                gate,
+                gate: Gate::new(width),
             };
-            let stepped = self.step(at, pass, None)?;
+            let stepped = self.step(at, pass)?;
             at = stepped.at;
             observe(at.pose());
             passes += 1;
-            let width = f32::from(4u16 << gate) * 1e-3;
-            if stepped.length < width * SHORT {
-                gate -= 2;
-            } else if stepped.length < width * MEDIUM {
-                gate -= 1;
+            let metres = width as f32 * 1e-3;
+            let narrower = if stepped.length < metres * SHORT {
+                width / 4
+            } else if stepped.length < metres * MEDIUM {
+                width / 2
+            } else {
+                continue;
+            };
+            if width == least {
+                break;
             }
+            width = narrower.max(least);
         }
-        Ok(self.judged(at, passes))
+        Ok(self.judged(at, passes, period))
     }
 
-    /// From a candidate to the pose: passes over a part of the points each, which share what they know, until all
-    /// parts have been taken in without a long step.
+    /// From a candidate to the pose: passes over all points until a step is a fraction of what the pose is uncertain by.
     fn fine(
         &self,
-        start: FixedPose,
+        candidate: &Candidate,
         observe: &mut impl FnMut(Pose),
-    ) -> Result<(Stepped, u8), MatchError> {
-        let mut state: Option<Stepped> = None;
-        let mut at = start;
-        let (mut part, mut passes) = (0, 0);
-        loop {
-            let pass = Pass {
-                period: PART * PARTS,
-                first: PART * (part % PARTS),
-                length: PART,
-                gate: FINE,
-            };
-            let earlier = state.as_ref().map(|state| &state.sums);
-            let stepped = self.step(at, pass, earlier)?;
-            at = stepped.at;
+    ) -> Result<Refined, MatchError> {
+        let mut at = candidate.at;
+        let mut passes = candidate.passes;
+        let mut pace = Pace::new();
+        // The first step need not be exact: every other eight points do.
+        let first = Pass {
+            period: 16,
+            length: 8,
+            ..self.all()
+        };
+        for pass in 0..FINE_MOST {
+            let last = self.step(at, if pass == 0 { first } else { self.all() })?;
+            at = at.moved(pace.adapted(last.by), self.start);
             observe(at.pose());
-            passes += 1;
-            part += 1;
-            if part >= PARTS || passes >= FINE_MOST {
-                return Ok((stepped, passes));
-            }
-            // After a long step other lines are met: what was known before is worth nothing.
-            state = (stepped.length < STILL).then_some(stepped);
-            if state.is_none() {
-                part = 0;
+            passes = passes.saturating_add(1);
+            let enough = if pass + 1 < FINE_MOST {
+                CONVERGED
+            } else {
+                2.0 * CONVERGED
+            };
+            if pass > 0 && last.sigmas < enough {
+                let candidate = self.judged(at, passes, (self.points.len() as u16 / JUDGED).max(1));
+                return Ok(Refined { candidate, last });
             }
         }
+        let step = self.step(at, self.all())?.length;
+        Err(MatchError::NotConverged { step })
     }
 
-    fn judged(&self, at: FixedPose, passes: u8) -> Candidate {
-        let stride = (self.points.len() as u16)
-            .div_ceil(self.config.coarse_beams.max(1))
-            .max(1);
-        let score = score::judge(self.lines, self.points, at, stride);
+    /// What a pose is worth by every `stride`-th point.
+    fn judged(&self, at: FixedPose, passes: u8, stride: u16) -> Candidate {
+        let score = score::judge(self.lines, self.points, at, stride, self.sigma);
         Candidate {
             at,
             passes,

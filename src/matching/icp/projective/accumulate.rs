@@ -100,8 +100,19 @@ pub(super) struct Pass {
     pub first: u16,
     /// Points used of a period.
     pub length: u16,
-    /// The gate: points farther than `4 << gate` mm from their line do not count. Half weight at 0.16 of it.
-    pub gate: u8,
+    pub gate: Gate,
+}
+
+/// How far off its line a point may be: half weight at 0.16 of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gate(u32);
+
+impl Gate {
+    /// Points farther than `width` mm from their line do not count; at least 16.
+    pub const fn new(width: u32) -> Self {
+        // Steps of the kernel in 1/16 mm, Q16.
+        Self((64 << 16) / (16 * if width < 16 { 16 } else { width }))
+    }
 }
 
 /// What passes found.
@@ -147,6 +158,20 @@ struct Row {
     /// Q8.
     w: i32,
 }
+
+/// A Gauss–Newton step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step {
+    /// See [`FixedPose::moved`].
+    pub by: [f32; 3],
+    /// What it takes off the weighted sum of the squared residuals, were they linear (mm²): over the variance of a residual,
+    /// the square of the step in standard deviations of the pose.
+    pub gain: f32,
+}
+
+/// How much larger errors are than the residuals of one scan say: the reference's noise is as large as the scan's and
+/// averaged over in its lines.
+const INFLATION: f32 = 1.6;
 
 /// Rows after which the 32-bit sums are moved to 64 bits: 13-bit rows, 8-bit weights cannot overflow before.
 const BLOCK: usize = 16;
@@ -281,7 +306,7 @@ impl<'a> Projection<'a> {
 }
 
 /// Weighted distance of a point from its line (1/16 mm) and its weight (Q8); `None` beyond the gate or 8 m away.
-pub(super) fn residual(line: &Line, placed: Placed, gate: u8) -> Option<(i32, i32)> {
+pub(super) fn residual(line: &Line, placed: Placed, gate: Gate) -> Option<(i32, i32)> {
     // Below 2¹⁷ the products with 13-bit normals stay in 32 bits.
     const FAR: i32 = 1 << 17;
     let (dx, dy) = (
@@ -292,7 +317,8 @@ pub(super) fn residual(line: &Line, placed: Placed, gate: u8) -> Option<(i32, i3
         return None;
     }
     let e = (i32::from(line.mx) * dx + i32::from(line.my) * dy + 512) >> 10;
-    let weight = KERNEL.get((e.unsigned_abs() >> (gate & 31)) as usize)?;
+    // Below 2¹⁹, and the factor is below 2¹⁵: a product too large for 32 bits is held at the end.
+    let weight = KERNEL.get((e.unsigned_abs().saturating_mul(gate.0) >> 16) as usize)?;
     Some((e, i32::from(*weight)))
 }
 
@@ -340,18 +366,6 @@ impl Sums {
         self.inliers += rows.len() as u16;
     }
 
-    /// Takes over what earlier passes knew of the pose: everything but their gradient, which the step between has
-    /// brought to nought.
-    pub fn remember(&mut self, earlier: &Self) {
-        for (sum, old) in self.h.iter_mut().zip(earlier.h) {
-            *sum += old;
-        }
-        self.inliers += earlier.inliers;
-        self.weight += earlier.weight;
-        self.cost += earlier.cost;
-        self.cross += earlier.cross;
-    }
-
     /// Sum of the weights.
     pub fn total_weight(&self) -> f32 {
         self.weight as f32 / 256.0
@@ -366,6 +380,11 @@ impl Sums {
         math::max(0.0, math::min(0.9, self.cross as f32 / self.cost as f32))
     }
 
+    pub fn inflation(&self) -> f32 {
+        let alike = self.correlation();
+        INFLATION * (1.0 + alike) / (1.0 - alike)
+    }
+
     /// Root of the weighted mean square residual (m).
     pub fn residual(&self) -> f32 {
         if self.weight == 0 {
@@ -375,7 +394,7 @@ impl Sums {
     }
 
     /// The Gauss–Newton step by the normal equations: see [`FixedPose::moved`]. `None` where they are singular.
-    pub fn step(&self, lever_shift: u32) -> Option<[f32; 3]> {
+    pub fn step(&self, lever_shift: u32) -> Option<Step> {
         let [xx, xy, xt, yy, yt, tt] = self.h.map(|v| v as f32);
         // A direction that the points leave open keeps still instead of making the system singular.
         let ridge = 4e-6 * (xx + yy + tt);
@@ -388,10 +407,15 @@ impl Sums {
             yt,
             tt,
         };
-        let [dx, dy, turn] = h.solve(self.b.map(|v| v as f32))?;
+        let b = self.b.map(|v| v as f32);
+        let [dx, dy, turn] = h.solve(b)?;
         // Normals are Q10, residuals 1/16 mm, levers mm of Q10 shifted down.
         let per_lever = 64.0 / (1u32 << (lever_shift & 31)) as f32;
-        Some([-1024.0 * dx, -1024.0 * dy, -per_lever * turn])
+        let [bx, by, bt] = b;
+        Some(Step {
+            by: [-1024.0 * dx, -1024.0 * dy, -per_lever * turn],
+            gain: (bx * dx + by * dy + bt * turn) * (1.0 / 256.0),
+        })
     }
 
     /// `Σ w a aᵀ` over a motion of the lidar, which is at `at` (1, m, m²).

@@ -34,10 +34,8 @@ pub(super) struct Best {
     pub ratio: f32,
 }
 
-/// A score at which the guess alone is believed, one for what lies far from the guess, and one at which the starts
-/// next to the guess are.
-const SURE: f32 = 0.7;
-const SURER: f32 = 0.8;
+/// A score at which what is found from the guess alone is believed, and one at which the starts next to the guess are.
+const SURE: f32 = 0.75;
 const LIKELY: f32 = 0.5;
 /// Far from the guess (m; a turn counted at 3 m).
 const FAR_OFF: f32 = 0.75;
@@ -79,14 +77,22 @@ const GLOBAL: Ring = Ring {
     pull: GLOBAL_PULL,
 };
 
+/// Starts moved along the direction that is known least (m): from what a gate still sees to what it does not.
+const SLIDES: [f32; 8] = [0.1, -0.1, 0.25, -0.25, 0.5, -0.5, 1.0, -1.0];
+
 /// Two candidates closer than this (m; a turn counted at 3 m) are the same pose, found twice.
 const SAME: f32 = 0.15;
 
-/// The candidates so far: the best one, and the best of those that are somewhere else.
+/// Candidates whose fine passes are made, and how far apart they are at least (m; a rotation counted at 3 m).
+const KEPT: usize = 3;
+const APART: f32 = 0.08;
+/// A pose elsewhere whose score is higher by this makes a match ambiguous that only its nearness to the guess decided.
+const CLEARLY: f32 = 0.05;
+
+/// Candidates of different places, best first, each with its worth: the score less what its distance from the guess
+/// costs.
 struct Race {
-    /// With its worth: the score less what its distance from the guess costs.
-    best: Result<(Candidate, f32), MatchError>,
-    rival: f32,
+    places: heapless::Vec<(Candidate, f32), KEPT>,
     starts: u8,
     passes: u8,
 }
@@ -94,71 +100,174 @@ struct Race {
 impl Race {
     fn enter(&mut self, found: Candidate, worth: f32) {
         self.passes = self.passes.saturating_add(found.passes);
-        let Ok((best, best_worth)) = self.best else {
-            self.best = Ok((found, worth));
-            return;
-        };
-        let elsewhere = best.at.distance(found.at) > SAME;
-        if worth > best_worth {
-            self.best = Ok((found, worth));
-            if elsewhere {
-                self.rival = best_worth;
+        let near = |(other, _): &&mut (Candidate, f32)| other.at.distance(found.at) < APART;
+        if let Some(same) = self.places.iter_mut().find(near) {
+            if worth > same.1 {
+                *same = (found, worth);
             }
-        } else if elsewhere {
-            self.rival = math::max(self.rival, worth);
+        } else if let Err(place) = self.places.push((found, worth))
+            && let Some(last) = self.places.last_mut()
+            && worth > last.1
+        {
+            *last = place;
+        }
+        self.sort();
+    }
+
+    /// Best first. There are few, and most are in order.
+    fn sort(&mut self) {
+        for _ in 1..KEPT {
+            for i in (1..self.places.len()).rev() {
+                if let Some([a, b]) = self.places.get_mut(i - 1..=i)
+                    && b.1 > a.1
+                {
+                    core::mem::swap(a, b);
+                }
+            }
         }
     }
 
-    fn is_below(&self, limit: f32) -> bool {
-        !self.best.is_ok_and(|(best, _)| best.value >= limit)
+    fn is_likely(&self) -> bool {
+        self.places.iter().any(|(found, _)| is_likely(found))
+    }
+
+    /// Lets a start compete.
+    fn start(&mut self, task: &Task<'_>, at: FixedPose, pull: f32) {
+        self.starts = self.starts.saturating_add(1);
+        if let Ok(found) = task.coarse(at, &mut |_| ()) {
+            self.enter(found, worth(task, &found, pull));
+        }
     }
 }
 
-/// Finds the best candidate: from the guess alone if that is sure, else from turned and moved starts.
+fn is_likely(found: &Candidate) -> bool {
+    found.value >= LIKELY
+}
+
+/// Score of a candidate less what its distance from the guess costs.
+fn worth(task: &Task<'_>, c: &Candidate, pull: f32) -> f32 {
+    let moved = c.at.distance_only(task.start);
+    c.value - pull * moved * moved
+}
+
+/// A converged candidate.
+pub(super) struct Refined {
+    pub candidate: Candidate,
+    /// The last pass.
+    pub last: Stepped,
+}
+
+/// Finds the best candidate: from the guess alone if that is sure, else from starts around what was found and around the
+/// guess.
 pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<Best, MatchError> {
+    let first = task
+        .coarse(task.start, observe)
+        .and_then(|found| task.fine(&found, observe));
+    match first {
+        Ok(Refined { candidate, last }) if candidate.value >= SURE => Ok(Best {
+            candidate,
+            last,
+            iterations: candidate.passes,
+            starts: 1,
+            ratio: 0.0,
+        }),
+        unsure => compete(task, unsure, observe),
+    }
+}
+
+/// Lets other starts compete with what was found from the guess.
+// Seldom needed: apart, so that the passes of every match keep their registers.
+#[cold]
+#[inline(never)]
+fn compete(
+    task: &Task<'_>,
+    first: Result<Refined, MatchError>,
+    observe: &mut impl FnMut(Pose),
+) -> Result<Best, MatchError> {
     let mut race = Race {
-        best: Err(MatchError::Degenerate),
-        rival: 0.0,
+        places: heapless::Vec::new(),
         starts: 1,
         passes: 0,
     };
-    match task.coarse(task.start, observe) {
-        Ok(found) => race.enter(found, found.value),
-        Err(error) => race.best = Err(error),
+    if let Ok(found) = &first {
+        race.passes = found.candidate.passes;
+        slide(task, &mut race, found);
     }
-    let far = race.best.is_ok_and(|(best, _)| is_far(task, &best));
-    let sure = if far { SURER } else { SURE };
-    match task.config.search {
+    let pull = match task.config.search {
+        Search::Global => around(task, &mut race, &GLOBAL),
         Search::Local => {
-            if race.is_below(sure) {
-                around(task, &mut race, &NEAR);
-            }
-            if race.is_below(LIKELY) {
-                around(task, &mut race, &FAR);
+            let near = around(task, &mut race, &NEAR);
+            let likely = race.is_likely() || first.as_ref().is_ok_and(|b| is_likely(&b.candidate));
+            if likely {
+                near
+            } else {
+                around(task, &mut race, &FAR)
             }
         }
-        Search::Global => {
-            if race.is_below(sure) {
-                around(task, &mut race, &GLOBAL);
-            }
+    };
+    settle(task, first, &race, pull, observe)
+}
+
+/// Makes the fine passes of the candidates and takes the one that is worth most, unless there is another one.
+fn settle(
+    task: &Task<'_>,
+    first: Result<Refined, MatchError>,
+    race: &Race,
+    pull: f32,
+    observe: &mut impl FnMut(Pose),
+) -> Result<Best, MatchError> {
+    let mut best = first;
+    let value = |found: &Result<Refined, MatchError>| {
+        found
+            .as_ref()
+            .map_or((f32::NEG_INFINITY, f32::NEG_INFINITY), |found| {
+                (worth(task, &found.candidate, pull), found.candidate.value)
+            })
+    };
+    let (mut most, mut highest) = value(&best);
+    let (mut rival, mut passes) = (f32::NEG_INFINITY, race.passes);
+    for (candidate, _) in &race.places {
+        let Ok(found) = task.fine(candidate, observe) else {
+            continue;
+        };
+        passes = passes.saturating_add(found.candidate.passes);
+        let elsewhere = best
+            .as_ref()
+            .is_ok_and(|best| best.candidate.at.distance(found.candidate.at) > SAME);
+        let found = Ok(found);
+        let (worth, score) = value(&found);
+        highest = math::max(highest, score);
+        if elsewhere {
+            rival = math::max(rival, math::min(worth, most));
+        }
+        if worth > most {
+            (best, most) = (found, worth);
         }
     }
-    let (best, worth) = race.best?;
-    let ratio = if worth > 0.0 { race.rival / worth } else { 1.0 };
-    let most = match task.config.search {
+    let best = best?;
+    let ratio = if most > 0.0 {
+        math::max(rival, 0.0) / most
+    } else {
+        1.0
+    };
+    let limit = match task.config.search {
         Search::Global => AMBIGUOUS,
-        Search::Local if is_far(task, &best) => DOUBTFUL * best.value,
-        // A good guess decides between two places.
+        Search::Local if is_far(task, &best.candidate) => DOUBTFUL * best.candidate.value,
+        // A good guess decides between two places ...
         Search::Local => f32::INFINITY,
     };
-    if ratio > most {
+    if ratio > limit {
         return Err(MatchError::Ambiguous { ratio });
     }
-    let (last, passes) = task.fine(best.at, observe)?;
+    // ... that explain the scan equally well.
+    if highest > best.candidate.value + CLEARLY {
+        let ratio = best.candidate.value / highest;
+        return Err(MatchError::Ambiguous { ratio });
+    }
     Ok(Best {
-        candidate: best,
-        last,
-        iterations: race.passes.saturating_add(passes),
+        candidate: best.candidate,
+        last: best.last,
+        iterations: passes,
         starts: race.starts,
         ratio,
     })
@@ -169,15 +278,31 @@ fn is_far(task: &Task<'_>, found: &Candidate) -> bool {
     found.at.distance(task.start) > FAR_OFF
 }
 
-/// Lets the starts of a ring compete.
-fn around(task: &Task<'_>, race: &mut Race, ring: &Ring) {
-    let worth = |c: &Candidate| {
-        let moved = c.at.distance_only(task.start);
-        c.value - ring.pull * moved * moved
-    };
-    if let Ok((best, old)) = &mut race.best {
-        *old = worth(best);
+/// Starts moved along the direction that a candidate knows least of: where walls leave it open, local minima lie along it.
+fn slide(task: &Task<'_>, race: &mut Race, found: &Refined) {
+    // Makes a heading comparable with a distance, as everywhere here (m).
+    const LEVER: f32 = 3.0;
+    let curvature = found.last.sums.curvature(task.lever_shift, found.last.at);
+    let [(least, [x, y, t]), _, _] = curvature.theta_scaled(1.0 / LEVER).eigen();
+    if least < task.config.min_constraint_share * found.last.sums.total_weight() {
+        // Nothing is known along it: the guess decides.
+        return;
     }
+    let at = found.candidate.at.pose();
+    for d in SLIDES {
+        let start = Pose::new(at.x + d * x, at.y + d * y, at.theta + d * t / LEVER);
+        if let Some(start) = FixedPose::new(start) {
+            race.start(task, start, NEAR_PULL);
+        }
+    }
+}
+
+/// Lets the starts of a ring compete; gives its pull.
+fn around(task: &Task<'_>, race: &mut Race, ring: &Ring) -> f32 {
+    for (candidate, old) in &mut race.places {
+        *old = worth(task, candidate, ring.pull);
+    }
+    race.sort();
     for &turn in ring.turns {
         for (side, &ahead) in [1.0, -1.0]
             .into_iter()
@@ -188,10 +313,8 @@ fn around(task: &Task<'_>, race: &mut Race, ring: &Ring) {
                 continue;
             }
             let turn = side * f32::from(turn) * (core::f32::consts::PI / 180.0);
-            race.starts = race.starts.saturating_add(1);
-            if let Ok(found) = task.coarse(task.start.moved_far([ahead, 0.0, turn]), &mut |_| ()) {
-                race.enter(found, worth(&found));
-            }
+            race.start(task, task.start.moved_far([ahead, 0.0, turn]), ring.pull);
         }
     }
+    ring.pull
 }

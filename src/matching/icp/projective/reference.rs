@@ -7,12 +7,13 @@ use crate::{
 
 /// A scan as lines by direction: the k-th of `n` lines is what the lidar saw at `k/n` of a turn.
 ///
-/// 12·N + 4 bytes. `n`, at most N, is best the number of beams of a full turn, also for a lidar that sees less than one.
+/// 12·N + 8 bytes. `n`, at most N, is best the number of beams of a full turn, also for a lidar that sees less than one.
 #[derive(Debug, Clone)]
 pub struct Reference<const N: usize> {
     lines: [Line; N],
     count: u16,
     directions: u16,
+    sigma: u16,
 }
 
 impl<const N: usize> Reference<N> {
@@ -33,6 +34,7 @@ impl<const N: usize> Reference<N> {
         Self {
             lines: Self::no_lines(),
             count: 0,
+            sigma: 0,
             directions: if directions < all { directions } else { all },
         }
     }
@@ -57,6 +59,11 @@ impl<const N: usize> Reference<N> {
         self.count
     }
 
+    /// Standard deviation of a range (mm), as the scan itself shows it.
+    pub(super) const fn sigma(&self) -> u16 {
+        self.sigma
+    }
+
     /// Whether there is no line at all.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
@@ -69,7 +76,7 @@ impl<const N: usize> Reference<N> {
     pub fn assign(&mut self, points: &[ScanPoint]) {
         let directions = usize::from(self.directions);
         let lines = self.lines.get_mut(..directions).unwrap_or_default();
-        self.count = normals::lay(lines, points);
+        (self.count, self.sigma) = normals::lay(lines, points);
     }
 }
 

@@ -36,8 +36,15 @@ const fn agreement() -> [u8; 32] {
 }
 
 /// Judges `at` by every `stride`-th point.
-pub(super) fn judge(lines: &[Line], points: &[ScanPoint], at: FixedPose, stride: u16) -> Score {
+pub(super) fn judge(
+    lines: &[Line],
+    points: &[ScanPoint],
+    at: FixedPose,
+    stride: u16,
+    sigma: u32,
+) -> Score {
     let mut projection = Projection::new(lines, at);
+    let per_mm = 1024 / sigma.max(1);
     let mut score = Score::default();
     for point in points.iter().step_by(usize::from(stride).max(1)) {
         let placed = projection.place(point);
@@ -54,7 +61,7 @@ pub(super) fn judge(lines: &[Line], points: &[ScanPoint], at: FixedPose, stride:
             .unsigned_abs()
             >> 10;
         let distance = weighted.saturating_mul(reciprocal(rough_length(mx, my)) >> 4) >> 10;
-        let step = (distance * 2 / 5) as usize;
+        let step = (distance.saturating_mul(per_mm) >> 8) as usize;
         if let Some(agreement) = AGREEMENT.get(step) {
             score.agreement += u32::from(*agreement);
             score.close += 1;

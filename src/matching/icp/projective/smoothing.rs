@@ -2,33 +2,39 @@
 
 use crate::{
     matching::icp::projective::{
-        accumulate::{self, FixedPose, Projection},
+        accumulate::{self, FixedPose, Gate, Projection},
         line::Line,
     },
     scan::{Points, ScanPoint},
 };
 
-/// Points nearer than this to their line (a gate: 32 mm) saw the same surface again; farther ones saw another.
-const SAME: u8 = 3;
+/// Points nearer to their line than so many fifths of a standard deviation of a range saw the same surface again; farther
+/// ones saw another.
+const SAME_FIFTHS: u32 = 16;
 
 /// Moves points seen from `at` along their beams, three quarters of the way to the lines that they meet: the mean of a
 /// surface as it was known and as it was seen once more.
-pub(super) fn smooth_towards(lines: &[Line], points: &mut [ScanPoint], at: FixedPose) {
+pub(super) fn smooth_towards(lines: &[Line], points: &mut [ScanPoint], at: FixedPose, sigma: u32) {
+    let same = SAME_FIFTHS * sigma / 5;
     let mut projection = Projection::new(lines, at);
     for point in points {
         let placed = projection.place(point);
         let Some(line) = projection.line(point, placed) else {
             continue;
         };
-        // Weighted, a distance from a line is about that along the beam.
-        let Some((beyond, _)) = accumulate::residual(line, placed, SAME) else {
+        let Some((beyond, _)) = accumulate::residual(line, placed, Gate::new(2 * same))
+            .filter(|(beyond, _)| beyond.unsigned_abs() < 16 * same)
+        else {
             continue;
         };
+        // Along the beam the line is the farther the more the beam grazes it; up to four times as far is believed.
         let (bx, by) = ((placed.x - at.x) >> 4, (placed.y - at.y) >> 4);
-        let outwards = i32::from(line.mx) * bx + i32::from(line.my) * by >= 0;
+        let facing = (i32::from(line.mx) * bx + i32::from(line.my) * by) >> 10;
+        let distance = i32::from(point.range);
+        let along = beyond * distance / facing.abs().max(distance / 4).max(1);
         // From 1/16 mm, and three quarters of it.
-        let nearer = (3 * beyond + 32) >> 6;
-        let range = i32::from(point.range) - if outwards { nearer } else { -nearer };
+        let nearer = (3 * along + 32) >> 6;
+        let range = distance - if facing >= 0 { nearer } else { -nearer };
         if (1..=i32::from(Points::<0>::MAX_RANGE_MM)).contains(&range) {
             *point = ScanPoint::at(point.bearing, range as u16);
         }
@@ -57,7 +63,7 @@ mod tests {
         for (wall, expected) in [(2020.0, 2005.0), (1980.0, 1995.0), (2100.0, 2100.0)] {
             let mut points = room(wall);
             let at = FixedPose::new(Pose::IDENTITY).expect("near");
-            smooth_towards(reference.lines(), &mut points, at);
+            smooth_towards(reference.lines(), &mut points, at, 10);
             for point in &points {
                 let distance = f32::from(point.x.unsigned_abs().max(point.y.unsigned_abs()));
                 // In corners lines face the lidar, and less is drawn along the beam.
@@ -78,7 +84,7 @@ mod tests {
         let pose = Pose::new(1.0, 0.0, core::f32::consts::PI);
         let at = FixedPose::new(pose).expect("near");
         let mut points = [ScanPoint::at(Bearing(0), 3012)];
-        smooth_towards(reference.lines(), &mut points, at);
+        smooth_towards(reference.lines(), &mut points, at, 10);
         assert!(points[0].range.abs_diff(3003) <= 2, "{points:?}");
     }
 }

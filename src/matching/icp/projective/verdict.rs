@@ -6,23 +6,13 @@ use crate::{
     matching::{
         Match, MatchError, Starts,
         degeneracy::{self, Open},
-        icp::projective::{
-            FINE, Task,
-            accumulate::{FixedPose, Pass},
-            multistart::Best,
-        },
+        icp::projective::{Task, accumulate::FixedPose, multistart::Best},
     },
     math,
 };
 
-/// How much larger errors are than the residuals of one scan say: the reference's noise is as large as the scan's and
-/// averaged over in its lines. Calibrated on simulated and recorded pairs: the mean normalised squared error
-/// of what `pairs --out` writes is near 3 for the former, 3 to 4 for the latter; 3 is ideal.
-const INFLATION: f32 = 1.9;
 /// Errors that no residual shows (m, rad).
 const FLOOR: (f32, f32) = (0.0005, 0.0001);
-/// Longest last step of a match that is believed (m).
-const TOO_LONG: f32 = 0.05;
 
 /// Judges the best candidate and keeps the guess along a direction that the scene does not determine.
 pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match, MatchError> {
@@ -46,10 +36,6 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         lever,
         config.min_constraint_share * sums.total_weight(),
     )?;
-    let step = best.last.length;
-    if open.is_none() && step > TOO_LONG {
-        return Err(MatchError::NotConverged { step });
-    }
     let mut pose = best.last.at.pose();
     if let Some(open) = &open {
         pose = kept(task, pose, guess, open);
@@ -60,14 +46,12 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         config.min_range_sigma * config.min_range_sigma,
     );
     let (information, spread) = degeneracy::uncertainty(&h, noise, open.as_ref())?;
-    let alike = sums.correlation();
     let (t, r) = FLOOR;
-    let covariance = Covariance(
-        spread
-            .0
-            .scaled(INFLATION * (1.0 + alike) / (1.0 - alike))
-            .plus(&Sym3::diagonal(t * t, t * t, r * r)),
-    );
+    let covariance = Covariance(spread.0.scaled(sums.inflation()).plus(&Sym3::diagonal(
+        t * t,
+        t * t,
+        r * r,
+    )));
     Ok(Match {
         pose,
         covariance,
@@ -91,12 +75,6 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
 #[cold]
 #[inline(never)]
 fn kept(task: &Task<'_>, pose: Pose, guess: Pose, open: &Open) -> Pose {
-    const ALL: Pass = Pass {
-        period: 1,
-        first: 0,
-        length: 1,
-        gate: FINE,
-    };
     let kept = open.keep(pose, guess);
     // The direction is straight where the scene may be round: two passes lead back across it.
     let mut pose = kept;
@@ -104,7 +82,7 @@ fn kept(task: &Task<'_>, pose: Pose, guess: Pose, open: &Open) -> Pose {
         let Some(at) = FixedPose::new(pose) else {
             break;
         };
-        if let Ok(across) = task.step(at, ALL, None) {
+        if let Ok(across) = task.step(at, task.all()) {
             pose = open.keep(across.at.pose(), kept);
         }
     }
