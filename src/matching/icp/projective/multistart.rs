@@ -37,6 +37,10 @@ pub(super) struct Best {
 /// A score at which what is found from the guess alone is believed, and one at which the starts next to the guess are.
 const SURE: f32 = 0.75;
 const LIKELY: f32 = 0.5;
+/// A score at which it is believed near the guess (m; a rotation counted at 3 m), if its places are known better than one
+/// range is: nine in ten of the wrong poses on recorded scans lie along a direction that is known worse.
+const SURE_NEAR: f32 = 0.6;
+const NEARBY: f32 = 0.35;
 /// Far from the guess (m; a turn counted at 3 m).
 const FAR_OFF: f32 = 0.75;
 /// A second pose that is worth this share of the best makes the match ambiguous.
@@ -157,6 +161,28 @@ pub(super) struct Refined {
     pub last: Stepped,
 }
 
+impl Refined {
+    /// Whether no other start is needed.
+    fn is_sure(&self, task: &Task<'_>) -> bool {
+        let found = &self.candidate;
+        found.value >= SURE
+            || found.value >= SURE_NEAR
+                && found.at.distance(task.start) < NEARBY
+                && self.is_sharp(task)
+    }
+
+    /// Whether the place is known better than a range is.
+    fn is_sharp(&self, task: &Task<'_>) -> bool {
+        let sums = &self.last.sums;
+        let (residual, range) = (sums.residual(), task.sigma as f32 * 1e-3);
+        let curvature = sums.curvature(task.lever_shift, self.last.at);
+        curvature.inverse().is_some_and(|spread| {
+            let square = math::max(spread.xx, spread.yy) * sums.inflation() * residual * residual;
+            square < range * range
+        })
+    }
+}
+
 /// Finds the best candidate: from the guess alone if that is sure, else from starts around what was found and around the
 /// guess.
 pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<Best, MatchError> {
@@ -164,10 +190,10 @@ pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<
         .coarse(task.start, observe)
         .and_then(|found| task.fine(&found, observe));
     match first {
-        Ok(Refined { candidate, last }) if candidate.value >= SURE => Ok(Best {
-            candidate,
-            last,
-            iterations: candidate.passes,
+        Ok(found) if found.is_sure(task) => Ok(Best {
+            candidate: found.candidate,
+            last: found.last,
+            iterations: found.candidate.passes,
             starts: 1,
             ratio: 0.0,
         }),
