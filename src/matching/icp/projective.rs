@@ -139,6 +139,8 @@ impl Default for IcpConfig {
 /// Width of the first coarse pass's gate (mm), and most coarse passes.
 const COARSE_FIRST: u32 = 2048;
 const COARSE_MOST: u8 = 16;
+/// Width of the gate (mm) from which on a start that is near a known place does not leave it.
+const KNOWN_WIDTH: u32 = 512;
 /// A step that is this short compared with the gate narrows it to a quarter, or to half.
 const SHORT: f32 = 1.0 / 16.0;
 const MEDIUM: f32 = 1.0 / 4.0;
@@ -305,9 +307,9 @@ impl Task<'_> {
     /// A pass over all points by the last gate.
     fn all(&self) -> Pass {
         Pass {
-            period: 1,
+            period: u16::MAX,
             first: 0,
-            length: 1,
+            length: u16::MAX,
             gate: Gate::new(self.fine_width()),
         }
     }
@@ -316,7 +318,8 @@ impl Task<'_> {
     fn step(&self, at: FixedPose, pass: Pass) -> Result<Stepped, MatchError> {
         let sums = accumulate::run(self.lines, self.points, at, self.lever_shift, pass);
         // Half of the share of the points that the pass looked at.
-        let needed = self.config.min_inliers * pass.length / pass.period.max(1) / 2;
+        let share = u32::from(self.config.min_inliers) * u32::from(pass.length);
+        let needed = (share / u32::from(pass.period.max(1)) / 2) as u16;
         if sums.inliers < needed {
             let found = sums.inliers;
             return Err(MatchError::TooFewCorrespondences { found, needed });
@@ -333,12 +336,14 @@ impl Task<'_> {
         })
     }
 
-    /// From a start to a candidate: coarse passes whose gate narrows as their steps get shorter, then the score.
+    /// From a start to a candidate: coarse passes whose gate narrows as their steps get shorter, then the score. `None` where
+    /// they lead to a place that is known.
     fn coarse(
         &self,
         start: FixedPose,
+        is_known: impl Fn(FixedPose) -> bool,
         observe: &mut impl FnMut(Pose),
-    ) -> Result<Candidate, MatchError> {
+    ) -> Result<Option<Candidate>, MatchError> {
         let beams = self.config.coarse_beams.max(1);
         let period = (self.points.len() as u16).div_ceil(beams).max(1);
         let least = self.fine_width();
@@ -369,8 +374,11 @@ impl Task<'_> {
                 break;
             }
             width = narrower.max(least);
+            if width <= KNOWN_WIDTH && is_known(at) {
+                return Ok(None);
+            }
         }
-        Ok(self.judged(at, passes, period))
+        Ok(Some(self.judged(at, passes, period)))
     }
 
     /// From a candidate to the pose: passes over all points until a step is a fraction of what the pose is uncertain by.

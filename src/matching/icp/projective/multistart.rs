@@ -90,12 +90,15 @@ const SAME: f32 = 0.15;
 /// Candidates whose fine passes are made, and how far apart they are at least (m; a rotation counted at 3 m).
 const KEPT: usize = 3;
 const APART: f32 = 0.08;
+const KNOWN: f32 = 0.05;
 /// A pose elsewhere whose score is higher by this makes a match ambiguous that only its nearness to the guess decided.
 const CLEARLY: f32 = 0.05;
 
 /// Candidates of different places, best first, each with its worth: the score less what its distance from the guess
 /// costs.
 struct Race {
+    /// Where the guess led.
+    first: Option<FixedPose>,
     places: heapless::Vec<(Candidate, f32), KEPT>,
     starts: u8,
     passes: u8,
@@ -131,6 +134,12 @@ impl Race {
         }
     }
 
+    /// Whether a pose is that of the guess or of a candidate.
+    fn knows(&self, at: FixedPose) -> bool {
+        let near = |known: &FixedPose| known.distance(at) < KNOWN;
+        self.first.as_ref().is_some_and(near) || self.places.iter().any(|(found, _)| near(&found.at))
+    }
+
     fn is_likely(&self) -> bool {
         self.places.iter().any(|(found, _)| is_likely(found))
     }
@@ -138,7 +147,8 @@ impl Race {
     /// Lets a start compete.
     fn start(&mut self, task: &Task<'_>, at: FixedPose, pull: f32) {
         self.starts = self.starts.saturating_add(1);
-        if let Ok(found) = task.coarse(at, &mut |_| ()) {
+        let found = task.coarse(at, |at| self.knows(at), &mut |_| ());
+        if let Ok(Some(found)) = found {
             self.enter(found, worth(task, &found, pull));
         }
     }
@@ -187,8 +197,8 @@ impl Refined {
 /// guess.
 pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<Best, MatchError> {
     let first = task
-        .coarse(task.start, observe)
-        .and_then(|found| task.fine(&found, observe));
+        .coarse(task.start, |_| false, observe)
+        .and_then(|found| task.fine(&found.ok_or(MatchError::Degenerate)?, observe));
     match first {
         Ok(found) if found.is_sure(task) => Ok(Best {
             candidate: found.candidate,
@@ -211,6 +221,7 @@ fn compete(
     observe: &mut impl FnMut(Pose),
 ) -> Result<Best, MatchError> {
     let mut race = Race {
+        first: first.as_ref().ok().map(|found| found.candidate.at),
         places: heapless::Vec::new(),
         starts: 1,
         passes: 0,
