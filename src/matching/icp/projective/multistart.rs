@@ -91,6 +91,7 @@ const SAME: f32 = 0.15;
 const KEPT: usize = 3;
 const APART: f32 = 0.08;
 const KNOWN: f32 = 0.05;
+const GAIN: f32 = 0.15;
 /// A pose elsewhere whose score is higher by this makes a match ambiguous that only its nearness to the guess decided.
 const CLEARLY: f32 = 0.05;
 
@@ -263,7 +264,11 @@ fn settle(
     };
     let (mut most, mut highest) = value(&best);
     let (mut rival, mut passes) = (f32::NEG_INFINITY, race.passes);
-    for (candidate, _) in &race.places {
+    for (candidate, worth) in &race.places {
+        // Fine passes add to what a candidate is worth, but not so much.
+        if *worth + GAIN < most && candidate.value + GAIN < highest {
+            continue;
+        }
         let Ok(found) = task.fine(candidate, observe) else {
             continue;
         };
