@@ -20,9 +20,11 @@
 //! What a pose is worth is judged apart from how it was found (`score`), so that several starts can compete.
 
 mod accumulate;
+mod fixed_pose;
 mod line;
 mod line_fit;
 mod multistart;
+mod normal_equations;
 mod normals;
 mod range_noise;
 pub mod reference;
@@ -42,8 +44,10 @@ use crate::{
     math,
     scan::ScanPoint,
 };
-use accumulate::{FixedPose, Gate, Pass, Sums};
+use accumulate::{Gate, Pass};
+use fixed_pose::FixedPose;
 use multistart::{Candidate, Refined};
+use normal_equations::Sums;
 
 /// How far the guess may be off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -146,10 +150,10 @@ const SHORT: f32 = 1.0 / 16.0;
 const MEDIUM: f32 = 1.0 / 4.0;
 /// Width of the last gate in fifths of a standard deviation of a range: half weight at 2 of them.
 const FINE_FIFTHS: u32 = 64;
-/// Most passes over all points. Those of recorded scans need 2 to 8.
-const FINE_MOST: u8 = 16;
-/// A match has converged when its last step, on all points, is shorter than this share of the standard deviation that its
-/// covariance tells: what is left of the way then is about as long, and adds a twentieth to the error.
+/// Most fine passes, each over half of the points. Those of recorded scans need 3 to 9.
+const FINE_MOST: u8 = 24;
+/// A match has converged when its last two steps, whose passes took all points between them, are each shorter than this share
+/// of the standard deviation that its covariance tells: what is left of the way then is shorter, and adds nothing to the error.
 /// After the last pass twice as much is let pass: points that change between two lines lead to and fro for ever.
 const CONVERGED: f32 = 0.3;
 /// Points that decide what a converged pose is worth, about.
@@ -244,16 +248,22 @@ pub fn smooth_towards<const N: usize>(
     }
 }
 
+/// A pose on the way, and the passes that led there.
+#[derive(Clone, Copy)]
+struct Reached {
+    at: FixedPose,
+    passes: u8,
+}
+
 /// A pass and the Gauss–Newton step it led to.
 struct Stepped {
-    /// Where the step leads.
-    at: FixedPose,
     /// The step: see [`FixedPose::moved`].
     by: [f32; 3],
+    /// What the pass knows.
+    mine: Sums,
+    /// The same with what is known of other points.
     sums: Sums,
-    /// Length of the step (m): see [`accumulate::length`].
-    length: f32,
-    /// The same in standard deviations of the pose.
+    /// Length of the step in standard deviations of the pose.
     sigmas: f32,
 }
 
@@ -304,6 +314,16 @@ impl Task<'_> {
         self.sigma * FINE_FIFTHS / 5
     }
 
+    /// A pass over every other eight points by the last gate.
+    fn half(&self, which: u8) -> Pass {
+        Pass {
+            period: 16,
+            first: 8 * u16::from(which),
+            length: 8,
+            gate: Gate::new(self.fine_width()),
+        }
+    }
+
     /// A pass over all points by the last gate.
     fn all(&self) -> Pass {
         Pass {
@@ -314,38 +334,42 @@ impl Task<'_> {
         }
     }
 
-    /// A pass and its Gauss–Newton step.
-    fn step(&self, at: FixedPose, pass: Pass) -> Result<Stepped, MatchError> {
-        let sums = accumulate::run(self.lines, self.points, at, self.lever_shift, pass);
+    /// A pass and the Gauss–Newton step by it and by what is known of other points.
+    fn step(
+        &self,
+        at: FixedPose,
+        pass: Pass,
+        others: Option<&Sums>,
+    ) -> Result<Stepped, MatchError> {
+        let mine = accumulate::run(self.lines, self.points, at, self.lever_shift, pass);
         // Half of the share of the points that the pass looked at.
         let share = u32::from(self.config.min_inliers) * u32::from(pass.length);
         let needed = (share / u32::from(pass.period.max(1)) / 2) as u16;
-        if sums.inliers < needed {
-            let found = sums.inliers;
+        if mine.inliers < needed {
+            let found = mine.inliers;
             return Err(MatchError::TooFewCorrespondences { found, needed });
         }
+        let sums = others.map_or(mine, |others| mine.plus(others));
         let step = sums.step(self.lever_shift).ok_or(MatchError::Degenerate)?;
         let noise = math::max(sums.residual(), self.config.min_range_sigma) * 1e3;
         let variance = sums.inflation() * noise * noise;
         Ok(Stepped {
-            at: at.moved(step.by, self.start),
             by: step.by,
+            mine,
             sums,
-            length: accumulate::length(step.by),
             sigmas: math::sqrt(math::max(step.gain, 0.0) / variance),
         })
     }
 
-    /// From a start to a candidate: coarse passes whose gate narrows as their steps get shorter, then the score. `None` where
-    /// they lead to a place that is known.
+    /// From a start to near a candidate: coarse passes whose gate narrows as their steps get shorter. `None` where they lead to
+    /// a place that is known.
     fn coarse(
         &self,
         start: FixedPose,
         is_known: impl Fn(FixedPose) -> bool,
         observe: &mut impl FnMut(Pose),
-    ) -> Result<Option<Candidate>, MatchError> {
-        let beams = self.config.coarse_beams.max(1);
-        let period = (self.points.len() as u16).div_ceil(beams).max(1);
+    ) -> Result<Option<Reached>, MatchError> {
+        let period = self.stride(self.config.coarse_beams);
         let least = self.fine_width();
         let mut at = start;
         let mut width = COARSE_FIRST.max(least);
@@ -358,14 +382,15 @@ impl Task<'_> {
                 length: 1,
                 gate: Gate::new(width),
             };
-            let stepped = self.step(at, pass)?;
-            at = stepped.at;
+            let stepped = self.step(at, pass, None)?;
+            at = at.moved(stepped.by, self.start);
             observe(at.pose());
             passes += 1;
             let metres = width as f32 * 1e-3;
-            let narrower = if stepped.length < metres * SHORT {
+            let length = fixed_pose::length(stepped.by);
+            let narrower = if length < metres * SHORT {
                 width / 4
-            } else if stepped.length < metres * MEDIUM {
+            } else if length < metres * MEDIUM {
                 width / 2
             } else {
                 continue;
@@ -378,27 +403,22 @@ impl Task<'_> {
                 return Ok(None);
             }
         }
-        Ok(Some(self.judged(at, passes, period)))
+        Ok(Some(Reached { at, passes }))
     }
 
-    /// From a candidate to the pose: passes over all points until a step is a fraction of what the pose is uncertain by.
-    fn fine(
-        &self,
-        candidate: &Candidate,
-        observe: &mut impl FnMut(Pose),
-    ) -> Result<Refined, MatchError> {
-        let mut at = candidate.at;
-        let mut passes = candidate.passes;
+    /// From a candidate to the pose: passes over one half of the points and then the other, each with what the last one knew of
+    /// its half, until steps are a fraction of what the pose is uncertain by.
+    fn fine(&self, from: Reached, observe: &mut impl FnMut(Pose)) -> Result<Refined, MatchError> {
+        let Reached { mut at, mut passes } = from;
         let mut pace = Pace::new();
-        // The first step need not be exact: every other eight points do.
-        let first = Pass {
-            period: 16,
-            length: 8,
-            ..self.all()
-        };
+        let mut others = None;
+        let mut before = f32::INFINITY;
+        let mut step = 0.0;
         for pass in 0..FINE_MOST {
-            let last = self.step(at, if pass == 0 { first } else { self.all() })?;
-            at = at.moved(pace.adapted(last.by), self.start);
+            let half = self.half(pass % 2);
+            let last = self.step(at, half, others.as_ref())?;
+            let by = pace.adapted(last.by);
+            at = at.moved(by, self.start);
             observe(at.pose());
             passes = passes.saturating_add(1);
             let enough = if pass + 1 < FINE_MOST {
@@ -406,17 +426,29 @@ impl Task<'_> {
             } else {
                 2.0 * CONVERGED
             };
-            if pass > 0 && last.sigmas < enough {
-                let candidate = self.judged(at, passes, (self.points.len() as u16 / JUDGED).max(1));
+            if math::max(last.sigmas, before) < enough {
+                let candidate = self.judged(Reached { at, passes }, JUDGED);
                 return Ok(Refined { candidate, last });
             }
+            step = fixed_pose::length(last.by);
+            before = if others.is_some() {
+                last.sigmas
+            } else {
+                f32::INFINITY
+            };
+            others = Some(last.mine.after(by, self.lever_shift));
         }
-        let step = self.step(at, self.all())?.length;
         Err(MatchError::NotConverged { step })
     }
 
-    /// What a pose is worth by every `stride`-th point.
-    fn judged(&self, at: FixedPose, passes: u8, stride: u16) -> Candidate {
+    /// Every how many-th point makes at most `beams`.
+    fn stride(&self, beams: u16) -> u16 {
+        (self.points.len() as u16).div_ceil(beams.max(1)).max(1)
+    }
+
+    /// What a pose is worth by at most `beams` points.
+    fn judged(&self, Reached { at, passes }: Reached, beams: u16) -> Candidate {
+        let stride = self.stride(beams);
         let score = score::judge(self.lines, self.points, at, stride, self.sigma);
         Candidate {
             at,

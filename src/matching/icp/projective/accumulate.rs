@@ -1,95 +1,15 @@
 //! One pass over the points: associate by projection, weigh, sum the normal equations. The hot loop, in integers.
 
 use crate::{
-    geometry::Pose, linalg::Sym3, matching::icp::projective::line::Line, math, scan::ScanPoint,
+    linalg::Sym3,
+    matching::icp::projective::{
+        fixed_pose::{FixedPose, REACH_MM},
+        line::Line,
+        normal_equations::Sums,
+    },
+    math,
+    scan::ScanPoint,
 };
-
-/// A pose in whole numbers: what a pass works with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct FixedPose {
-    /// 1/16 mm.
-    pub x: i32,
-    /// 1/16 mm.
-    pub y: i32,
-    /// 2⁻³² turn.
-    pub turn: u32,
-}
-
-/// 1/16 mm in a metre.
-const PER_METRE: f32 = 16_000.0;
-/// 2⁻³² turns in a radian.
-const PER_RADIAN: f32 = 4_294_967_296.0 / core::f32::consts::TAU;
-
-impl FixedPose {
-    /// Nearest fixed pose; `None` for one that is not finite or farther than 27 m away.
-    pub fn new(pose: Pose) -> Option<Self> {
-        let inside = |v: f32| v > -27.0 && v < 27.0;
-        if !(inside(pose.x) && inside(pose.y) && pose.theta.is_finite()) {
-            return None;
-        }
-        Some(Self {
-            x: math::round_to_i32(pose.x * PER_METRE),
-            y: math::round_to_i32(pose.y * PER_METRE),
-            turn: math::round_to_i32(math::wrap_angle(pose.theta) * PER_RADIAN) as u32,
-        })
-    }
-
-    /// Metres and radians again.
-    pub fn pose(self) -> Pose {
-        Pose::new(
-            self.x as f32 / PER_METRE,
-            self.y as f32 / PER_METRE,
-            self.turn as i32 as f32 / PER_RADIAN,
-        )
-    }
-
-    /// Started elsewhere.
-    pub fn moved_far(self, by: [f32; 3]) -> Self {
-        let (s, c) = math::sin_cos(self.turn as i32 as f32 / PER_RADIAN);
-        let ahead = |v: f32| math::round_to_i32(v * PER_METRE);
-        Self {
-            x: self.x + ahead(c * by[0] - s * by[1]),
-            y: self.y + ahead(s * by[0] + c * by[1]),
-            turn: self
-                .turn
-                .wrapping_add(math::round_to_i32(math::wrap_angle(by[2]) * PER_RADIAN) as u32),
-        }
-    }
-
-    /// Distance between the two places (m).
-    pub fn distance_only(self, other: Self) -> f32 {
-        let (dx, dy) = (
-            (self.x - other.x) as f32 / PER_METRE,
-            (self.y - other.y) as f32 / PER_METRE,
-        );
-        math::sqrt(dx * dx + dy * dy)
-    }
-
-    /// Distance between two poses (m), a turn counted at 3 m.
-    pub fn distance(self, other: Self) -> f32 {
-        let turn = math::abs(self.turn.wrapping_sub(other.turn) as i32 as f32 / PER_RADIAN);
-        self.distance_only(other) + 3.0 * turn
-    }
-
-    /// Moved by a step: by `dx`, `dy` (1/16 mm) and by `turn` (rad) about the reference's origin, itself held within
-    /// 0.5 m and 0.3 rad, and the pose within [`REACH_MM`] of where the search started.
-    pub fn moved(self, [dx, dy, turn]: [f32; 3], home: Self) -> Self {
-        let held = |v: f32, most: f32| math::max(math::min(v, most), -most);
-        let turn = held(turn, 0.3);
-        let step = |d: f32| math::round_to_i32(held(d, 0.5 * PER_METRE));
-        let reach = |v: i32, home: i32| v.max(home - 16 * REACH_MM).min(home + 16 * REACH_MM);
-        Self {
-            x: reach(self.x + step(dx - turn * self.y as f32), home.x),
-            y: reach(self.y + step(dy + turn * self.x as f32), home.y),
-            turn: self
-                .turn
-                .wrapping_add(math::round_to_i32(turn * PER_RADIAN) as u32),
-        }
-    }
-}
-
-/// How far from its start a search may get (mm).
-const REACH_MM: i32 = 4000;
 
 /// Which points a pass takes, and how far off they may be.
 #[derive(Debug, Clone, Copy)]
@@ -113,23 +33,6 @@ impl Gate {
         // Steps of the kernel in 1/16 mm, Q16.
         Self((64 << 16) / (16 * if width < 16 { 16 } else { width }))
     }
-}
-
-/// What passes found.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Sums {
-    /// `Σ w a aᵀ`, upper triangle by rows, `a` the row `(mx, my, lever)`.
-    h: [i64; 6],
-    /// `Σ w a e`.
-    b: [i64; 3],
-    /// Points nearer to their line than the gate.
-    pub inliers: u16,
-    /// `Σ w`, Q8.
-    weight: u32,
-    /// `Σ w e²` (mm², Q8).
-    cost: i64,
-    /// `Σ w e e′`, `e′` the residual of the point before (mm², Q8).
-    cross: i64,
 }
 
 /// Geman–McClure weights `(k²/(k² + e²))²` by the residual in 64 steps up to the gate, `k` 16 of them: Q8.
@@ -159,19 +62,16 @@ struct Row {
     w: i32,
 }
 
-/// A Gauss–Newton step.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Step {
-    /// See [`FixedPose::moved`].
-    pub by: [f32; 3],
-    /// What it takes off the weighted sum of the squared residuals, were they linear (mm²): over the variance of a residual,
-    /// the square of the step in standard deviations of the pose.
-    pub gain: f32,
+/// [`Sums`] while rows are added.
+#[derive(Default)]
+struct Totals {
+    h: [i64; 6],
+    b: [i64; 3],
+    inliers: u16,
+    weight: u32,
+    cost: i64,
+    cross: i64,
 }
-
-/// How much larger errors are than the residuals of one scan say: the reference's noise is as large as the scan's and
-/// averaged over in its lines.
-const INFLATION: f32 = 1.6;
 
 /// Rows after which the 32-bit sums are moved to 64 bits: 13-bit rows, 8-bit weights cannot overflow before.
 const BLOCK: usize = 16;
@@ -186,12 +86,14 @@ pub(super) fn run(
     lever_shift: u32,
     pass: Pass,
 ) -> Sums {
-    let mut sums = Sums::default();
+    let mut totals = Totals::default();
     let mut projection = Projection::new(lines, at);
     let mut rows = [Row::default(); BLOCK];
     let mut filled = 0;
-    for chunk in points.chunks(usize::from(pass.period).max(1)) {
-        let part = chunk.get(usize::from(pass.first)..).unwrap_or_default();
+    let mut from = usize::from(pass.first);
+    while let Some(part) = points.get(from..)
+        && !part.is_empty()
+    {
         for point in part.iter().take(usize::from(pass.length)) {
             let placed = projection.place(point);
             let Some(line) = projection.line(point, placed) else {
@@ -213,13 +115,14 @@ pub(super) fn run(
             }
             filled += 1;
             if filled >= BLOCK {
-                sums.add(&rows);
+                totals.add(&rows);
                 filled = 0;
             }
         }
+        from += usize::from(pass.period).max(1);
     }
-    sums.add(rows.get(..filled).unwrap_or_default());
-    sums
+    totals.add(rows.get(..filled).unwrap_or_default());
+    totals.sums()
 }
 
 /// Bits that bring every lever below 2¹³, the bound of a weighted normal: as many as the farthest place has that a
@@ -322,7 +225,7 @@ pub(super) fn residual(line: &Line, placed: Placed, gate: Gate) -> Option<(i32, 
     Some((e, i32::from(*weight)))
 }
 
-impl Sums {
+impl Totals {
     /// Adds at most [`BLOCK`] rows.
     fn add(&mut self, rows: &[Row]) {
         let mut h = [0i32; 6];
@@ -366,77 +269,22 @@ impl Sums {
         self.inliers += rows.len() as u16;
     }
 
-    /// Sum of the weights.
-    pub fn total_weight(&self) -> f32 {
-        self.weight as f32 / 256.0
-    }
-
-    /// How alike the residuals of neighbouring points are, 0 to 0.9: where they share an error of the reference's
-    /// surface, they are worth fewer points than there are.
-    pub fn correlation(&self) -> f32 {
-        if self.cost <= 0 {
-            return 0.0;
-        }
-        math::max(0.0, math::min(0.9, self.cross as f32 / self.cost as f32))
-    }
-
-    pub fn inflation(&self) -> f32 {
-        let alike = self.correlation();
-        INFLATION * (1.0 + alike) / (1.0 - alike)
-    }
-
-    /// Root of the weighted mean square residual (m).
-    pub fn residual(&self) -> f32 {
-        if self.weight == 0 {
-            return 0.0;
-        }
-        math::sqrt(self.cost as f32 / self.weight as f32) * 1e-3
-    }
-
-    /// The Gauss–Newton step by the normal equations: see [`FixedPose::moved`]. `None` where they are singular.
-    pub fn step(&self, lever_shift: u32) -> Option<Step> {
+    fn sums(&self) -> Sums {
         let [xx, xy, xt, yy, yt, tt] = self.h.map(|v| v as f32);
-        // A direction that the points leave open keeps still instead of making the system singular.
-        let ridge = 4e-6 * (xx + yy + tt);
-        let (xx, yy, tt) = (xx + ridge, yy + ridge, tt + ridge);
-        let h = Sym3 {
-            xx,
-            xy,
-            xt,
-            yy,
-            yt,
-            tt,
-        };
-        let b = self.b.map(|v| v as f32);
-        let [dx, dy, turn] = h.solve(b)?;
-        // Normals are Q10, residuals 1/16 mm, levers mm of Q10 shifted down.
-        let per_lever = 64.0 / (1u32 << (lever_shift & 31)) as f32;
-        let [bx, by, bt] = b;
-        Some(Step {
-            by: [-1024.0 * dx, -1024.0 * dy, -per_lever * turn],
-            gain: (bx * dx + by * dy + bt * turn) * (1.0 / 256.0),
-        })
-    }
-
-    /// `Σ w a aᵀ` over a motion of the lidar, which is at `at` (1, m, m²).
-    pub fn curvature(&self, lever_shift: u32, at: FixedPose) -> Sym3 {
-        const N: f32 = 1.0 / 1024.0;
-        let lever = (1u32 << (lever_shift & 31)) as f32 * (1e-3 / 1024.0);
-        let [xx, xy, xt, yy, yt, tt] = self.h.map(|v| v as f32);
-        Sym3 {
-            xx: xx * N * N,
-            xy: xy * N * N,
-            xt: xt * N * lever,
-            yy: yy * N * N,
-            yt: yt * N * lever,
-            tt: tt * lever * lever,
+        Sums {
+            h: Sym3 {
+                xx,
+                xy,
+                xt,
+                yy,
+                yt,
+                tt,
+            },
+            b: self.b.map(|v| v as f32),
+            inliers: self.inliers,
+            weight: self.weight as f32,
+            cost: self.cost as f32,
+            cross: self.cross as f32,
         }
-        .about(at.x as f32 / PER_METRE, at.y as f32 / PER_METRE)
     }
-}
-
-/// Length of a step of [`Sums::step`] (m), a turn counted at 3 m.
-pub(super) fn length(step: [f32; 3]) -> f32 {
-    let [x, y, turn] = step.map(math::abs);
-    (x + y) / PER_METRE + 3.0 * turn
 }

@@ -4,7 +4,7 @@ use crate::{
     geometry::Pose,
     matching::{
         MatchError,
-        icp::projective::{Search, Stepped, Task, accumulate::FixedPose},
+        icp::projective::{Reached, Search, Stepped, Task, fixed_pose::FixedPose},
     },
     math,
 };
@@ -19,6 +19,15 @@ pub(super) struct Candidate {
     pub overlap: u16,
     /// See [`super::score::Score::value`].
     pub value: f32,
+}
+
+impl Candidate {
+    const fn reached(&self) -> Reached {
+        Reached {
+            at: self.at,
+            passes: self.passes,
+        }
+    }
 }
 
 /// What [`search`] settled on.
@@ -138,7 +147,8 @@ impl Race {
     /// Whether a pose is that of the guess or of a candidate.
     fn knows(&self, at: FixedPose) -> bool {
         let near = |known: &FixedPose| known.distance(at) < KNOWN;
-        self.first.as_ref().is_some_and(near) || self.places.iter().any(|(found, _)| near(&found.at))
+        self.first.as_ref().is_some_and(near)
+            || self.places.iter().any(|(found, _)| near(&found.at))
     }
 
     fn is_likely(&self) -> bool {
@@ -149,7 +159,8 @@ impl Race {
     fn start(&mut self, task: &Task<'_>, at: FixedPose, pull: f32) {
         self.starts = self.starts.saturating_add(1);
         let found = task.coarse(at, |at| self.knows(at), &mut |_| ());
-        if let Ok(Some(found)) = found {
+        if let Ok(Some(reached)) = found {
+            let found = task.judged(reached, task.config.coarse_beams);
             self.enter(found, worth(task, &found, pull));
         }
     }
@@ -186,7 +197,7 @@ impl Refined {
     fn is_sharp(&self, task: &Task<'_>) -> bool {
         let sums = &self.last.sums;
         let (residual, range) = (sums.residual(), task.sigma as f32 * 1e-3);
-        let curvature = sums.curvature(task.lever_shift, self.last.at);
+        let curvature = sums.curvature(task.lever_shift, self.candidate.at);
         curvature.inverse().is_some_and(|spread| {
             let square = math::max(spread.xx, spread.yy) * sums.inflation() * residual * residual;
             square < range * range
@@ -199,7 +210,7 @@ impl Refined {
 pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<Best, MatchError> {
     let first = task
         .coarse(task.start, |_| false, observe)
-        .and_then(|found| task.fine(&found.ok_or(MatchError::Degenerate)?, observe));
+        .and_then(|found| task.fine(found.ok_or(MatchError::Degenerate)?, observe));
     match first {
         Ok(found) if found.is_sure(task) => Ok(Best {
             candidate: found.candidate,
@@ -269,7 +280,7 @@ fn settle(
         if *worth + GAIN < most && candidate.value + GAIN < highest {
             continue;
         }
-        let Ok(found) = task.fine(candidate, observe) else {
+        let Ok(found) = task.fine(candidate.reached(), observe) else {
             continue;
         };
         passes = passes.saturating_add(found.candidate.passes);
@@ -324,7 +335,10 @@ fn is_far(task: &Task<'_>, found: &Candidate) -> bool {
 fn slide(task: &Task<'_>, race: &mut Race, found: &Refined) {
     // Makes a heading comparable with a distance, as everywhere here (m).
     const LEVER: f32 = 3.0;
-    let curvature = found.last.sums.curvature(task.lever_shift, found.last.at);
+    let curvature = found
+        .last
+        .sums
+        .curvature(task.lever_shift, found.candidate.at);
     let [(least, [x, y, t]), _, _] = curvature.theta_scaled(1.0 / LEVER).eigen();
     if least < task.config.min_constraint_share * found.last.sums.total_weight() {
         // Nothing is known along it: the guess decides.

@@ -1,10 +1,7 @@
 //! How well a pose explains a scan, independent of how the pose was found.
 
 use crate::{
-    matching::icp::projective::{
-        accumulate::{FixedPose, Projection},
-        line::Line,
-    },
+    matching::icp::projective::{accumulate::Projection, fixed_pose::FixedPose, line::Line},
     math::{reciprocal, rough_length},
     scan::ScanPoint,
 };

@@ -2,7 +2,8 @@
 
 use crate::{
     matching::icp::projective::{
-        accumulate::{self, FixedPose, Gate, Projection},
+        accumulate::{self, Gate, Projection},
+        fixed_pose::FixedPose,
         line::Line,
     },
     scan::{Points, ScanPoint},

@@ -6,7 +6,7 @@ use crate::{
     matching::{
         Match, MatchError, Starts,
         degeneracy::{self, Open},
-        icp::projective::{Task, accumulate::FixedPose, multistart::Best},
+        icp::projective::{Task, fixed_pose::FixedPose, multistart::Best},
     },
     math,
 };
@@ -30,13 +30,13 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
     }
     let sums = &best.last.sums;
     let lever = degeneracy::mean_range(task.points);
-    let h = sums.curvature(task.lever_shift, best.last.at);
+    let h = sums.curvature(task.lever_shift, best.candidate.at);
     let open = degeneracy::find(
         &h.theta_scaled(1.0 / lever),
         lever,
         config.min_constraint_share * sums.total_weight(),
     )?;
-    let mut pose = best.last.at.pose();
+    let mut pose = best.candidate.at.pose();
     if let Some(open) = &open {
         pose = kept(task, pose, guess, open);
     }
@@ -82,8 +82,8 @@ fn kept(task: &Task<'_>, pose: Pose, guess: Pose, open: &Open) -> Pose {
         let Some(at) = FixedPose::new(pose) else {
             break;
         };
-        if let Ok(across) = task.step(at, task.all()) {
-            pose = open.keep(across.at.pose(), kept);
+        if let Ok(across) = task.step(at, task.all(), None) {
+            pose = open.keep(at.moved(across.by, task.start).pose(), kept);
         }
     }
     pose
