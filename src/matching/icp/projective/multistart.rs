@@ -57,6 +57,8 @@ const AMBIGUOUS: f32 = 0.95;
 /// In a local search that ended far from the guess, the ambiguity limit is this times the score: the less a pose explains,
 /// the likelier is another one.
 const DOUBTFUL: f32 = 1.2;
+/// The same near the guess, which decides between places that explain about as much of the scan if they explain most of it.
+const UNDECIDED: f32 = 1.4;
 /// What a start loses per square metre between its end and the guess: a guess is worth something.
 const NEAR_PULL: f32 = 2.5;
 const FAR_PULL: f32 = 0.5;
@@ -307,7 +309,7 @@ fn settle(
         Search::Global => AMBIGUOUS,
         Search::Local if is_far(task, &best.candidate) => DOUBTFUL * best.candidate.value,
         // A good guess decides between two places ...
-        Search::Local => f32::INFINITY,
+        Search::Local => UNDECIDED * best.candidate.value,
     };
     if ratio > limit {
         return Err(MatchError::Ambiguous { ratio });
