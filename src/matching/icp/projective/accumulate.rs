@@ -30,8 +30,8 @@ pub(super) struct Gate(u32);
 impl Gate {
     /// Points farther than `width` mm from their line do not count; at least 16.
     pub const fn new(width: u32) -> Self {
-        // Steps of the kernel in 1/16 mm, Q16.
-        Self((64 << 16) / (16 * if width < 16 { 16 } else { width }))
+        // 64 steps of the kernel, in 1/16 mm: Q16.
+        Self((4 << 16) / if width < 16 { 16 } else { width })
     }
 }
 
@@ -53,13 +53,13 @@ const fn kernel() -> [u8; 64] {
 /// A row of the system of equations, with its weight.
 #[derive(Clone, Copy, Default)]
 struct Row {
-    mx: i32,
-    my: i32,
-    lever: i32,
     /// Residual (1/16 mm).
     e: i32,
+    mx: i16,
+    my: i16,
+    lever: i16,
     /// Q8.
-    w: i32,
+    w: i16,
 }
 
 /// [`Sums`] while rows are added.
@@ -85,7 +85,8 @@ pub(super) fn run(
     at: FixedPose,
     lever_shift: u32,
     pass: Pass,
-) -> Sums {
+    known: &mut Sums,
+) {
     let mut totals = Totals::default();
     let mut projection = Projection::new(lines, at);
     let mut rows = [Row::default(); BLOCK];
@@ -106,11 +107,11 @@ pub(super) fn run(
             let lever = (my * (placed.x >> 4) - mx * (placed.y >> 4)) >> lever_shift;
             if let Some(row) = rows.get_mut(filled) {
                 *row = Row {
-                    mx,
-                    my,
-                    lever,
                     e,
-                    w,
+                    mx: line.mx,
+                    my: line.my,
+                    lever: lever as i16,
+                    w: w as i16,
                 };
             }
             filled += 1;
@@ -122,7 +123,7 @@ pub(super) fn run(
         from += usize::from(pass.period).max(1);
     }
     totals.add(rows.get(..filled).unwrap_or_default());
-    totals.sums()
+    *known = totals.sums();
 }
 
 /// Bits that bring every lever below 2¹³, the bound of a weighted normal: as many as the farthest place has that a
@@ -231,13 +232,8 @@ impl Totals {
         let mut h = [0i32; 6];
         let mut b = [0i32; 3];
         for row in rows {
-            let &Row {
-                mx,
-                my,
-                lever,
-                e,
-                w,
-            } = row;
+            let e = row.e;
+            let [mx, my, lever, w] = [row.mx, row.my, row.lever, row.w].map(i32::from);
             let (wx, wy, wt) = ((w * mx) >> 8, (w * my) >> 8, (w * lever) >> 8);
             h[0] += wx * mx;
             h[1] += wx * my;
@@ -251,7 +247,7 @@ impl Totals {
         }
         let (mut weight, mut cost, mut cross, mut before) = (0, 0i32, 0i32, 0);
         for row in rows {
-            let (e, we) = (row.e >> 4, (row.w * row.e) >> 4);
+            let (e, we) = (row.e >> 4, (i32::from(row.w) * row.e) >> 4);
             weight += row.w as u32;
             cost += we * e;
             cross += we * before;

@@ -4,7 +4,9 @@ use crate::{
     geometry::Pose,
     matching::{
         MatchError,
-        icp::projective::{Reached, Search, Stepped, Task, fixed_pose::FixedPose},
+        icp::projective::{
+            Search, Task, descent::Reached, fixed_pose::FixedPose, normal_equations::Sums,
+        },
     },
     math,
 };
@@ -33,8 +35,8 @@ impl Candidate {
 /// What [`search`] settled on.
 pub(super) struct Best {
     pub candidate: Candidate,
-    /// The last pass.
-    pub last: Stepped,
+    /// What the last passes knew.
+    pub sums: Sums,
     /// Passes of all starts.
     pub iterations: u8,
     /// Starts tried.
@@ -181,8 +183,8 @@ fn worth(task: &Task<'_>, c: &Candidate, pull: f32) -> f32 {
 /// A converged candidate.
 pub(super) struct Refined {
     pub candidate: Candidate,
-    /// The last pass.
-    pub last: Stepped,
+    /// What the last passes knew.
+    pub sums: Sums,
 }
 
 impl Refined {
@@ -197,7 +199,7 @@ impl Refined {
 
     /// Whether the place is known better than a range is.
     fn is_sharp(&self, task: &Task<'_>) -> bool {
-        let sums = &self.last.sums;
+        let sums = &self.sums;
         let (residual, range) = (sums.residual(), task.sigma as f32 * 1e-3);
         let curvature = sums.curvature(task.lever_shift, self.candidate.at);
         curvature.inverse().is_some_and(|spread| {
@@ -216,7 +218,7 @@ pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<
     match first {
         Ok(found) if found.is_sure(task) => Ok(Best {
             candidate: found.candidate,
-            last: found.last,
+            sums: found.sums,
             iterations: found.candidate.passes,
             starts: 1,
             ratio: 0.0,
@@ -321,7 +323,7 @@ fn settle(
     }
     Ok(Best {
         candidate: best.candidate,
-        last: best.last,
+        sums: best.sums,
         iterations: passes,
         starts: race.starts,
         ratio,
@@ -337,12 +339,9 @@ fn is_far(task: &Task<'_>, found: &Candidate) -> bool {
 fn slide(task: &Task<'_>, race: &mut Race, found: &Refined) {
     // Makes a heading comparable with a distance, as everywhere here (m).
     const LEVER: f32 = 3.0;
-    let curvature = found
-        .last
-        .sums
-        .curvature(task.lever_shift, found.candidate.at);
+    let curvature = found.sums.curvature(task.lever_shift, found.candidate.at);
     let [(least, [x, y, t]), _, _] = curvature.theta_scaled(1.0 / LEVER).eigen();
-    if least < task.config.min_constraint_share * found.last.sums.total_weight() {
+    if least < task.config.min_constraint_share * found.sums.total_weight() {
         // Nothing is known along it: the guess decides.
         return;
     }

@@ -17,9 +17,9 @@ const FLOOR: (f32, f32) = (0.0005, 0.0001);
 /// Judges the best candidate and keeps the guess along a direction that the scene does not determine.
 pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match, MatchError> {
     let config = task.config;
-    if best.last.sums.inliers < config.min_inliers {
+    if best.sums.inliers < config.min_inliers {
         return Err(MatchError::TooFewCorrespondences {
-            found: best.last.sums.inliers,
+            found: best.sums.inliers,
             needed: config.min_inliers,
         });
     }
@@ -28,7 +28,7 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
             score: best.candidate.value,
         });
     }
-    let sums = &best.last.sums;
+    let sums = &best.sums;
     let lever = degeneracy::mean_range(task.points);
     let h = sums.curvature(task.lever_shift, best.candidate.at);
     let open = degeneracy::find(
@@ -56,7 +56,7 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
         pose,
         covariance,
         information,
-        inliers: best.last.sums.inliers,
+        inliers: best.sums.inliers,
         overlap: best.candidate.overlap,
         beams: task.points.len() as u16,
         score: best.candidate.value,
@@ -82,8 +82,8 @@ fn kept(task: &Task<'_>, pose: Pose, guess: Pose, open: &Open) -> Pose {
         let Some(at) = FixedPose::new(pose) else {
             break;
         };
-        if let Ok(across) = task.step(at, task.all(), None) {
-            pose = open.keep(at.moved(across.by, task.start).pose(), kept);
+        if let Ok(across) = task.step_by_all(at) {
+            pose = open.keep(at.moved(across, task.start).pose(), kept);
         }
     }
     pose
