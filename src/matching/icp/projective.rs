@@ -74,8 +74,8 @@ pub struct IcpConfig {
     pub min_score: f32,
     /// Standard deviation of a range (m): the least noise that the covariance assumes. Default 0.005.
     pub min_range_sigma: f32,
-    /// A direction counts as degenerate if fewer than this share of the beams constrain it. Default 0.02: what the noise of
-    /// the normals alone amounts to in a corridor.
+    /// A direction counts as degenerate if fewer than this share of the beams constrain it. Default 0.01: in a corridor normals
+    /// that are good to 2.7° make it 0.002, and what stands out of the walls as much again.
     pub min_constraint_share: f32,
 }
 
@@ -87,7 +87,7 @@ impl IcpConfig {
         min_inliers: 30,
         min_score: 0.25,
         min_range_sigma: 0.005,
-        min_constraint_share: 0.02,
+        min_constraint_share: 0.01,
     };
 
     /// The same, if every setting is within its range; usable in a `const`.

@@ -191,7 +191,9 @@ impl Refined {
     /// Whether no other start is needed.
     fn is_sure(&self, task: &Task<'_>) -> bool {
         let found = &self.candidate;
-        found.value >= SURE
+        // Far from a guess that is worth little another place may look the same.
+        let elsewhere = task.config.search == Search::Global && is_far(task, found);
+        found.value >= SURE && !elsewhere
             || found.value >= SURE_NEAR
                 && found.at.distance(task.start) < NEARBY
                 && self.is_sharp(task)

@@ -33,6 +33,8 @@ pub(super) struct Step {
 /// averaged over in its lines.
 const INFLATION: f32 = 1.6;
 
+/// Share of all that the points know which is added to each direction of a step.
+const STILL: f32 = 0.001;
 /// Normals are Q10.
 const NORMAL: f32 = 1.0 / 1024.0;
 
@@ -90,9 +92,9 @@ impl Sums {
 
     /// The Gauss–Newton step by the normal equations: see [`FixedPose::moved`]. `None` where they are singular.
     pub fn step(&self, lever_shift: u32) -> Option<Step> {
-        // A direction that the points leave open keeps still instead of making the system singular.
-        let ridge = 4e-6 * (self.h.xx + self.h.yy + self.h.tt);
-        let h = self.h.plus(&Sym3::diagonal(ridge, ridge, ridge));
+        // A direction that the points leave open, but for the noise of the normals, keeps still.
+        let ridge = STILL * (self.h.xx + self.h.yy);
+        let h = self.h.plus(&Sym3::diagonal(ridge, ridge, STILL * self.h.tt));
         let [dx, dy, turn] = h.solve(self.b)?;
         let [bx, by, bt] = self.b;
         Some(Step {
