@@ -31,7 +31,7 @@ const FINE_MOST: u8 = 24;
 /// A match has converged when its last two steps, whose passes took all points between them, are each shorter than this share
 /// of the standard deviation that its covariance tells: what is left of the way then is shorter, and adds nothing to the error.
 /// After the last pass twice as much is let pass: points that change between two lines lead to and fro for ever.
-const CONVERGED: f32 = 0.3;
+pub(super) const CONVERGED: f32 = 0.3;
 /// Points that decide what a converged pose is worth, about.
 const JUDGED: u16 = 120;
 

@@ -94,7 +94,9 @@ impl Sums {
     pub fn step(&self, lever_shift: u32) -> Option<Step> {
         // A direction that the points leave open, but for the noise of the normals, keeps still.
         let ridge = STILL * (self.h.xx + self.h.yy);
-        let h = self.h.plus(&Sym3::diagonal(ridge, ridge, STILL * self.h.tt));
+        let h = self
+            .h
+            .plus(&Sym3::diagonal(ridge, ridge, STILL * self.h.tt));
         let [dx, dy, turn] = h.solve(self.b)?;
         let [bx, by, bt] = self.b;
         Some(Step {

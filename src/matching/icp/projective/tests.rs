@@ -1,7 +1,7 @@
 //! What holds of every match, whatever the scene.
 
-use super::*;
-use crate::scan::Bearing;
+use super::{descent::CONVERGED, *};
+use crate::{math, scan::Bearing};
 
 /// Walls of a room with a box in it, as ends of segments (m).
 const WALLS: [[f32; 4]; 8] = [
