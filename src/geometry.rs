@@ -147,6 +147,22 @@ impl Twist {
         omega: 0.0,
     };
 
+    /// What this velocity has more than another one.
+    #[must_use]
+    pub(crate) fn minus(self, other: Self) -> Self {
+        Self {
+            vx: self.vx - other.vx,
+            vy: self.vy - other.vy,
+            omega: self.omega - other.omega,
+        }
+    }
+
+    /// Speed of the position (m/s).
+    #[must_use]
+    pub(crate) fn speed(self) -> f32 {
+        Point::new(self.vx, self.vy).norm()
+    }
+
     /// The constant velocity that leads along `motion` in `seconds`: the inverse of [`Twist::displacement`].
     ///
     /// Zero for a time that is not positive.

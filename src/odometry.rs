@@ -7,20 +7,31 @@
 mod attempt;
 mod config;
 mod deskew;
+mod error_model;
+mod fusion;
 mod keyframes;
 mod motion;
 mod prior;
 mod sparse;
 mod state;
 mod step;
+mod tracking;
 
 pub use config::OdometryConfig;
 pub use sparse::{SparseConfig, SparseOdometry};
 pub use state::Odometry;
 pub use step::{Counters, Refusal, Step};
 
-use crate::{geometry::EgoMotion, math, scan::Scan};
+use crate::{
+    geometry::{EgoMotion, Pose, Twist},
+    linalg::{Covariance, Sym3},
+    matching::{Match, MatchError},
+    math,
+    scan::Scan,
+};
 use attempt::Attempt;
+use motion::{Source, Times};
+use prior::Prior;
 
 impl<const N: usize> Odometry<N> {
     /// Takes a scan in and says where the robot is.
@@ -38,8 +49,8 @@ impl<const N: usize> Odometry<N> {
         self.deskewed.assign(scan, prior.twist, &self.config.points);
         let mut step = Step {
             pose: prior.pose,
-            covariance: prior.covariance,
-            outcome: self.try_match(prior.pose),
+            covariance: self.covariance,
+            outcome: self.try_match(prior.pose, &prior),
             keyframe: false,
         };
         let mut best = Attempt {
@@ -50,28 +61,88 @@ impl<const N: usize> Odometry<N> {
             self.retry_fallback(&prior, times, &mut best);
         }
         if best.is_unsure() && self.may_retry_turn_rates(&prior, times) {
-            self.retry_turn_rates(scan, times, &mut best);
+            self.retry_turn_rates(scan, times, &prior, &mut best);
         }
+        self.refuse_contradicting(&prior, times, &mut best);
+        self.refuse_ambiguous(&prior, &mut best);
 
         self.deskewed.pose = prior.pose;
         match &mut *best.outcome {
             Ok(found) => {
-                let refined = self.refine(scan, (found, best.twist), &prior, times);
-                (step.pose, step.covariance) = refined;
+                self.refine(scan, (found, best.twist), &prior, times);
             }
-            Err(_) => self
-                .motion
-                .advance(prior.pose, best.twist, prior.wheel_twist, times),
+            Err(refusal) => {
+                let covered = matches!(refusal, Refusal::NoMatch(MatchError::TooFewBeams { .. }));
+                self.coast(&prior, best.twist, times, covered);
+            }
         }
-        (self.pose, self.covariance) = (step.pose, step.covariance);
 
-        let acceleration = math::abs(self.motion.twist.omega - last.omega) * times.duration;
-        step.keyframe = self.is_keyframe(&step.outcome, acceleration);
-        if step.keyframe {
-            self.keep(&step.outcome);
-        }
-        self.note_outcome(&step.outcome, step.keyframe);
+        self.conclude(&mut step, last, &prior, times);
         self.end_us = scan.end_us();
         step
+    }
+
+    /// Keeps the scan as a keyframe if it is to be one, counts it, and tells where the robot is.
+    #[inline(never)]
+    fn conclude(&mut self, step: &mut Step, last: Twist, prior: &Prior, times: Times) {
+        let skew = self.skew(&step.outcome, last, prior.source, times);
+        step.keyframe = self.is_keyframe(
+            &step.outcome,
+            (self.motion.twist.omega - last.omega) * times.duration,
+        );
+        if step.keyframe {
+            self.keep(&step.outcome, &skew);
+        }
+        self.note_outcome(&step.outcome, step.keyframe);
+        step.pose = self.pose;
+        step.covariance = self
+            .covariance
+            .plus(&skew)
+            .plus(&error_model::unforeseen(times.duration));
+        if prior.source == Source::Wheels {
+            // What the robot has done since the middle of the scan is known by the wheels alone.
+            step.covariance = step
+                .covariance
+                .plus(&Covariance(prior.growth.0.scaled(0.25)));
+        }
+    }
+
+    /// Covariance that the change of velocity since the last scan, whose velocity was `last`, adds to a matched pose.
+    fn skew(
+        &self,
+        outcome: &Result<Match, Refusal>,
+        last: Twist,
+        source: Source,
+        times: Times,
+    ) -> Covariance {
+        /// What wheels said and no robot can turn between two scans is no rotation (rad).
+        const MAX_ROTATION: f32 = 0.35;
+        outcome
+            .as_ref()
+            .map_or(Covariance(Sym3::diagonal(0.0, 0.0, 0.0)), |found| {
+                let mut change = self.motion.twist.minus(last);
+                // Wheels that jumped may still have told a rotation.
+                let said = self.motion.said.theta - self.motion.twist.omega * times.seconds;
+                if math::abs(said) < MAX_ROTATION {
+                    let said = Twist::from_motion(Pose::new(0.0, 0.0, said), times.seconds).omega;
+                    change.omega = math::max(math::abs(change.omega), math::abs(said));
+                }
+                error_model::skew(change, times.duration, source, &found.covariance)
+            })
+    }
+
+    /// Takes the prior as the pose: the scan has no match.
+    #[inline(never)]
+    fn coast(&mut self, prior: &Prior, twist: Twist, times: Times, covered: bool) {
+        self.motion
+            .advance(prior.pose, twist, prior.wheel_twist, times);
+        self.wheel_errors.interrupt();
+        let tracking = &mut self.tracking;
+        tracking.blind += times.elapsed;
+        tracking.covered |= covered;
+        self.pose = prior.pose;
+        self.covariance = self
+            .keyframe
+            .covariance_at(prior.pose, &self.tracking.covariance());
     }
 }

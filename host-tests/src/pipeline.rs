@@ -166,8 +166,13 @@ fn push_scan<E: Estimator<N>, const N: usize>(
     wheels: Option<Pose>,
     ready: impl FnMut(Revolution<'_, E, N>),
 ) {
-    if let (Some(wheels), Some(last)) = (wheels, beams.last()) {
-        tracker.push_wheels(last.time_us, wheels);
+    // Arrays may be reversed or interleaved: the latest beam need not be the last.
+    let first = beams.first().map_or(0, |beam| beam.time_us);
+    let latest = beams
+        .iter()
+        .max_by_key(|beam| beam.time_us.wrapping_sub(first).cast_signed());
+    if let (Some(wheels), Some(latest)) = (wheels, latest) {
+        tracker.push_wheels(latest.time_us, wheels);
     }
     tracker.push_scan(beams.iter().copied(), ready);
 }

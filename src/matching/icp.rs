@@ -30,3 +30,4 @@ pub use projective::{IcpConfig, Reference, Search, align};
 pub(crate) use projective::{Line, align_observed, smooth_towards};
 #[cfg(feature = "internals")]
 pub use projective::{Line, align_observed, smooth_towards};
+pub(crate) use projective::{align_near, remove_companions};

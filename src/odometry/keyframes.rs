@@ -1,7 +1,13 @@
 //! When a scan becomes the keyframe, and what is counted.
 
-use super::{state::Odometry, step::Refusal};
+use super::{
+    error_model::{ANY_HEADING, WALKING},
+    state::Odometry,
+    step::Refusal,
+    tracking::Tracking,
+};
 use crate::{
+    linalg::{Covariance, Sym3},
     matching::{Match, icp},
     math,
 };
@@ -25,7 +31,7 @@ impl<const N: usize> Odometry<N> {
             Ok(found) => {
                 let moved = self.keyframe.pose.between(self.pose);
                 let overlap = f32::from(found.overlap) / f32::from(found.beams.max(1));
-                let near = if acceleration > MAX_ACCELERATION {
+                let near = if math::abs(acceleration) > MAX_ACCELERATION {
                     0.5
                 } else {
                     1.0
@@ -57,21 +63,46 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
-    /// Makes the scan just placed the keyframe. Where its pose is known in all directions its points are first moved
+    /// Makes the scan just placed the keyframe, its pose uncertain by `skew` besides. Where its pose is known in all directions its points are first moved
     /// towards the surfaces of the keyframe before: so errors do not add up as long as these stay in sight.
     #[inline(never)]
-    pub(super) fn keep(&mut self, outcome: &Result<Match, Refusal>) {
+    pub(super) fn keep(&mut self, outcome: &Result<Match, Refusal>, skew: &Covariance) {
+        /// A keyframe's points are in place in the middle of the scan: they are bent by a sixth of what its end is off.
+        const BENT: f32 = 1.0 / 32.0;
         let (keyframe, scan) = (&mut self.keyframe, &mut self.deskewed);
+        let motion = keyframe.pose.between(scan.pose);
+        let pose = self.config.points.mount.lidar_motion(motion);
+        if outcome.is_ok() {
+            icp::remove_companions(&keyframe.reference, &mut scan.points, pose);
+        }
         if outcome
             .as_ref()
             .is_ok_and(|found| found.degenerate_direction.is_none())
         {
-            let motion = keyframe.pose.between(scan.pose);
-            let pose = self.config.points.mount.lidar_motion(motion);
             icp::smooth_towards(&keyframe.reference, scan.points.as_mut_slice(), pose);
         }
         keyframe.reference.assign(scan.points.as_slice());
         keyframe.pose = scan.pose;
-        keyframe.covariance = self.covariance;
+        if matches!(outcome, Err(Refusal::NoMatch(_) | Refusal::TooFar { .. })) {
+            self.covariance = self.covariance_when_lost();
+        }
+        self.covariance = self.covariance.plus(&Covariance(skew.0.scaled(BENT)));
+        self.keyframe.covariance = self.covariance;
+        self.tracking = Tracking::at(self.pose, self.tracking.coasting);
+        self.wheel_errors.interrupt();
+    }
+
+    /// Covariance of the pose once the keyframe is given up: near it scans should have matched, and the robot may have
+    /// been carried anywhere since the last match, and turned.
+    fn covariance_when_lost(&self) -> Covariance {
+        /// From farther than this a keyframe is no longer in sight (m).
+        const IN_SIGHT: f32 = 1.0;
+        if self.keyframe.pose.between(self.pose).distance() > IN_SIGHT {
+            return self.covariance;
+        }
+        let carried = 2.0 * WALKING * self.tracking.blind;
+        let (distance, rotation) = (carried * carried, ANY_HEADING * ANY_HEADING);
+        self.covariance
+            .plus(&Covariance(Sym3::diagonal(distance, distance, rotation)))
     }
 }

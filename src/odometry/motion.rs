@@ -16,6 +16,17 @@ pub(super) struct Times {
     pub seconds: f32,
     /// Time from the scan's first beam to its last (s).
     pub duration: f32,
+    /// Time from the last scan's end to this one's as far as is known, also over a gap (s).
+    pub elapsed: f32,
+}
+
+/// Where a prior comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Source {
+    /// The wheels' motion since the last scan.
+    Wheels,
+    /// The last velocity, which is believed to go on.
+    Velocity,
 }
 
 /// Motion up to the last scan.
@@ -27,10 +38,14 @@ pub(super) struct Motion {
     middle: Pose,
     /// Velocity during the last scan by the wheels; zero without them.
     wheel_twist: Twist,
+    /// Motion that the wheels said last, believed or not.
+    pub said: Pose,
     /// Time from the last scan's first beam to its last (s).
     duration: f32,
     /// Running mean of the time from scan to scan (s).
     mean_interval: f32,
+    /// Running mean of the distance of such a time from that mean (s): a clock that jitters.
+    pub jitter: f32,
 }
 
 impl Motion {
@@ -39,9 +54,56 @@ impl Motion {
         twist: Twist::ZERO,
         middle: Pose::IDENTITY,
         wheel_twist: Twist::ZERO,
+        said: Pose::IDENTITY,
         duration: 0.0,
         mean_interval: 0.0,
+        jitter: 0.0,
     };
+
+    /// Time between two scans of which the clock says that it was `told` (s): the usual one, where the clock jitters by as
+    /// much or went back. Learns how much it jitters.
+    pub fn interval(&mut self, told: f32) -> f32 {
+        /// Farther from the usual time than so many times the jitter, scans are missing.
+        const MISSING: f32 = 4.0;
+        /// Share of one interval in the running means.
+        const SHARE: f32 = 0.1;
+        if self.mean_interval <= 0.0 {
+            self.mean_interval = math::max(told, 0.0);
+            return self.mean_interval;
+        }
+        let unlike = told - self.mean_interval;
+        let is_jitter = math::abs(unlike) < MISSING * self.jitter;
+        let seconds = if is_jitter || told <= 0.0 {
+            self.mean_interval
+        } else {
+            told
+        };
+        // A gap is no jitter, or as little as can be told apart.
+        let most = self.mean_interval + MISSING * self.jitter;
+        let unlike = math::max(-most, math::min(unlike, most));
+        self.mean_interval = math::max(self.mean_interval + SHARE * unlike, 0.0);
+        self.jitter += SHARE * (math::abs(unlike) - self.jitter);
+        seconds
+    }
+
+    /// Whether wheels that say `motion` have jumped: it differs by more than any robot accelerates from where the robot
+    /// would be by the velocity that it was found to have, and from the motion that they said before.
+    pub fn is_jump(&self, motion: Pose, coasting: Twist, times: Times) -> bool {
+        /// Hardest braking and turning of a robot (m/s², rad/s²) ...
+        const HARDEST: (f32, f32) = (10.0, 20.0);
+        /// ... and how far off a motion between two scans may be measured besides (m, rad).
+        const NOISE: (f32, f32) = (0.1, 0.15);
+        if times.seconds <= 0.0 {
+            return false;
+        }
+        let square = times.seconds * times.seconds;
+        let far = |expected: Pose| {
+            let off = expected.between(motion);
+            off.distance() > HARDEST.0 * square + NOISE.0
+                || math::abs(off.theta) > HARDEST.1 * square + NOISE.1
+        };
+        far(coasting.displacement(times.seconds)) && far(self.said)
+    }
 
     /// Velocity during a scan whose middle was found at `middle`: wheel velocity plus the correction that the last two
     /// matches imply. Without wheels the whole velocity comes from the matches.
@@ -60,13 +122,6 @@ impl Motion {
         if wheels.is_some() && missed.distance() < SLIP.0 && math::abs(missed.theta) < SLIP.1 {
             return by_wheels;
         }
-        // A clock whose moments jump makes a velocity of any size. The wheels' correction is of the same interval.
-        let least = 0.5 * self.mean_interval;
-        let between = if wheels.is_none() && between < least {
-            least
-        } else {
-            between
-        };
         let missed = Twist::from_motion(missed, between);
         Twist {
             vx: by_wheels.vx + missed.vx,
@@ -75,12 +130,30 @@ impl Motion {
         }
     }
 
+    /// Rotation that a change of the turn rate adds between what a match of a scan deskewed with `during` says of its end
+    /// and its real end: a constant acceleration since the last scan.
+    ///
+    /// Wheels tell the mean rate over the scan, and its middle lags by a twelfth of what the rate has changed by. Without
+    /// them the rate is that from the last scan's middle to this one's: it lags by half a scan, as long as it changes.
+    pub fn unskewed(&self, during: Twist, source: Source, times: Times) -> Pose {
+        /// Less is the noise of two matches (rad).
+        const NOISE: f32 = 0.015;
+        let change = (during.omega - self.twist.omega) * times.duration;
+        if math::abs(change) < NOISE {
+            return Pose::IDENTITY;
+        }
+        let share = match source {
+            Source::Wheels => 1.0 / 12.0,
+            Source::Velocity => 0.25,
+        };
+        Pose::new(0.0, 0.0, share * change)
+    }
+
     /// Takes a scan that ended at `end` and during which the robot moved with `twist`.
     pub fn advance(&mut self, end: Pose, twist: Twist, wheels: Option<Twist>, times: Times) {
         self.middle = end * twist.displacement(-0.5 * times.duration);
         self.wheel_twist = wheels.unwrap_or(Twist::ZERO);
         self.duration = times.duration;
-        self.mean_interval += 0.1 * (times.seconds - self.mean_interval);
         self.twist = twist;
     }
 }
@@ -92,6 +165,7 @@ mod tests {
     const TIMES: Times = Times {
         seconds: 0.1,
         duration: 0.1,
+        elapsed: 0.1,
     };
 
     fn driving(vx: f32, omega: f32) -> Twist {
@@ -138,18 +212,27 @@ mod tests {
     fn a_clock_whose_moments_jump_makes_no_wild_velocity() {
         let mut motion = Motion::STANDING;
         let (mut end, step) = (Pose::IDENTITY, Pose::new(0.05, 0.0, 0.0));
-        for k in 0..40 {
-            let seconds = if k % 4 == 3 { 0.001 } else { 0.133 };
+        for k in 0..60 {
+            // Every fourth scan is told a tenth of a second late, or more than that.
+            let seconds = motion.interval([0.1, 0.1, 0.22, -0.02][k % 4]);
             let times = Times {
                 seconds,
                 duration: 0.0,
+                elapsed: seconds,
             };
             end = end * step;
             let during = motion.during(end, None, times);
-            // 0.5 m/s; without the bound 50 m/s.
-            assert!(k < 20 || during.vx < 1.1, "{during:?}");
+            // 0.5 m/s.
+            assert!(k < 20 || (during.vx - 0.5).abs() < 0.1, "{k}: {during:?}");
             motion.advance(end, during, None, times);
         }
+        // Scans that are missing from a regular clock are a longer time.
+        let mut regular = Motion::STANDING;
+        for _ in 0..20 {
+            assert!((regular.interval(0.1) - 0.1).abs() < 1e-6);
+        }
+        assert_eq!(regular.interval(0.3), 0.3);
+        assert!((regular.interval(0.1) - 0.1).abs() < 0.02);
     }
 
     #[test]

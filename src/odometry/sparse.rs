@@ -204,7 +204,8 @@ impl<const N: usize, const K: usize> SparseOdometry<N, K> {
             &self.config.icp,
         )
         .map_err(Refusal::NoMatch)?;
-        match farther(Pose::IDENTITY, found.pose, self.config.max_correction) {
+        let limit = self.config.max_correction;
+        match farther(Pose::IDENTITY, found.pose, (limit, 2.0 * limit)) {
             Some((distance, rotation)) => Err(Refusal::TooFar { distance, rotation }),
             None => Ok(found),
         }

@@ -1,6 +1,9 @@
 //! What the odometry remembers from scan to scan.
 
-use super::{config::OdometryConfig, deskew::Deskewed, motion::Motion, step::Counters};
+use super::{
+    config::OdometryConfig, deskew::Deskewed, error_model::WheelErrors, motion::Motion,
+    step::Counters, tracking::Tracking,
+};
 use crate::{
     geometry::{Pose, Twist},
     keyframe::Keyframe,
@@ -11,7 +14,7 @@ use crate::{
 
 /// Pose from scans, in fixed memory.
 ///
-/// 20·N + 300 bytes: a keyframe's lines and the current scan's points. N is the most beams of a revolution; beyond that
+/// 20·N + 500 bytes: a keyframe's lines and the current scan's points. N is the most beams of a revolution; beyond that
 /// it does not change the result, which depends on [`OdometryConfig::directions`] alone.
 #[derive(Debug, Clone)]
 pub struct Odometry<const N: usize> {
@@ -21,6 +24,8 @@ pub struct Odometry<const N: usize> {
     pub(super) pose: Pose,
     pub(super) covariance: Covariance,
     pub(super) motion: Motion,
+    pub(super) tracking: Tracking,
+    pub(super) wheel_errors: WheelErrors,
     pub(super) end_us: u32,
     pub(super) refused_in_a_row: u8,
     pub(super) counters: Counters,
@@ -37,6 +42,8 @@ impl<const N: usize> Odometry<N> {
             pose: Pose::IDENTITY,
             covariance: Covariance(Sym3::diagonal(0.0, 0.0, 0.0)),
             motion: Motion::STANDING,
+            tracking: Tracking::at(Pose::IDENTITY, 0.0),
+            wheel_errors: WheelErrors::new(),
             end_us: 0,
             refused_in_a_row: 0,
             counters: Counters {
@@ -44,6 +51,8 @@ impl<const N: usize> Odometry<N> {
                 refused: 0,
                 keyframes: 0,
                 lost: 0,
+                wheel_jumps: 0,
+                contradicted: 0,
             },
         }
     }

@@ -69,4 +69,8 @@ pub struct Counters {
     pub keyframes: u32,
     /// Keyframes given up because too many scans in a row were refused: the pose may have jumped.
     pub lost: u32,
+    /// Scans at which the wheels said a motion that no robot makes: they started over, or their pose was corrected.
+    pub wheel_jumps: u32,
+    /// Scans whose match contradicted the prior and was believed.
+    pub contradicted: u32,
 }

@@ -84,6 +84,11 @@ impl<const N: usize> Points<N> {
         &mut self.points
     }
 
+    /// Keeps the points for which `keep` is true.
+    pub(crate) fn retain(&mut self, keep: impl FnMut(&ScanPoint) -> bool) {
+        self.points.retain(keep);
+    }
+
     /// Places hit by `scan`, as seen by the lidar at the scan's last beam if the robot moves with `twist`.
     ///
     /// Beams without a return or outside the configured ranges are left out. A scan taken in motion costs more: each beam

@@ -2,6 +2,7 @@
 
 use beamfix::{
     geometry::Pose,
+    linalg::Sym3,
     odometry::{OdometryConfig, Step},
     scan::Mount,
 };
@@ -78,12 +79,7 @@ impl Outcome {
             self.largest.0.max(metres),
             self.largest.1.max(degrees.abs()),
         );
-        let square = step
-            .covariance
-            .information()
-            .map_or(f64::INFINITY, |information| {
-                f64::from(information.0.quadratic([x as f32, y as f32, turned as f32]))
-            });
+        let square = normalised(&step.covariance.0, [x, y, turned]);
         self.last_square = square / 3.0;
         if step.outcome.is_err() {
             return;
@@ -140,4 +136,28 @@ fn follow<const N: usize>(
     (outcome.scans, outcome.refused, outcome.lost) =
         (counters.scans, counters.refused, counters.lost);
     outcome
+}
+
+/// `eᵀ C⁻¹ e` in `f64`: a covariance may know one direction a million times better than another one.
+fn normalised(c: &Sym3, [x, y, t]: [f64; 3]) -> f64 {
+    let [xx, xy, xt, yy, yt, tt] = [c.xx, c.xy, c.xt, c.yy, c.yt, c.tt].map(f64::from);
+    // Cholesky, and forward substitution: the square is that of the solution.
+    let a = libm::sqrt(xx);
+    let (b, c) = (xy / a, xt / a);
+    let d = libm::sqrt(yy - b * b);
+    let e = (yt - b * c) / d;
+    let f = libm::sqrt(tt - c * c - e * e);
+    let u = x / a;
+    let v = (y - b * u) / d;
+    let w = (t - c * u - e * v) / f;
+    let square = u * u + v * v + w * w;
+    // The first pose is exact, and so is its covariance.
+    if square.is_nan() && x == 0.0 && y == 0.0 && t == 0.0 {
+        return 0.0;
+    }
+    if square.is_nan() {
+        f64::INFINITY
+    } else {
+        square
+    }
 }

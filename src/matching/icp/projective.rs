@@ -20,6 +20,7 @@
 //! What a pose is worth is judged apart from how it was found (`score`), so that several starts can compete.
 
 mod accumulate;
+mod companions;
 mod descent;
 mod fixed_pose;
 mod line;
@@ -35,6 +36,7 @@ mod smoothing;
 mod tests;
 mod verdict;
 
+pub(crate) use companions::remove_companions;
 pub use line::Line;
 pub use reference::Reference;
 
@@ -186,6 +188,30 @@ pub fn align_observed<const N: usize>(
     points: &[ScanPoint],
     guess: Pose,
     config: &IcpConfig,
+    observe: impl FnMut(Pose),
+) -> Result<Match, MatchError> {
+    search(reference, points, (guess, false), config, observe)
+}
+
+/// As [`align`]; where `is_decided`, the guess is known to decide between places near by that explain the scan equally well.
+///
+/// # Errors
+/// As [`align`].
+pub(crate) fn align_near<const N: usize>(
+    reference: &Reference<N>,
+    points: &[ScanPoint],
+    guess: (Pose, bool),
+    config: &IcpConfig,
+) -> Result<Match, MatchError> {
+    search(reference, points, guess, config, |_| ())
+}
+
+/// The pose of `points`, and whether the guess decides between places near by.
+fn search<const N: usize>(
+    reference: &Reference<N>,
+    points: &[ScanPoint],
+    (guess, is_decided): (Pose, bool),
+    config: &IcpConfig,
     mut observe: impl FnMut(Pose),
 ) -> Result<Match, MatchError> {
     let needed = config.min_inliers;
@@ -204,6 +230,7 @@ pub fn align_observed<const N: usize>(
         start,
         lever_shift: accumulate::lever_shift(points, start),
         sigma: u32::from(reference.sigma()),
+        is_decided,
         config,
     };
     let best = multistart::search(&task, &mut observe)?;
@@ -234,5 +261,7 @@ struct Task<'a> {
     lever_shift: u32,
     /// Standard deviation of a range (mm).
     sigma: u32,
+    /// Whether the guess decides between places near by.
+    is_decided: bool,
     config: &'a IcpConfig,
 }

@@ -247,6 +247,7 @@ fn sick(beams: usize, interleaved: usize) -> Scene {
         sensor: Sensor {
             beams,
             interleaved,
+            by_bearing: true,
             rate: 5.0,
             sector: PI * beams as f64 / (beams as f64 - 1.0),
             ..Sensor::SICK

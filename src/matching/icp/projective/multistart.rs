@@ -313,6 +313,7 @@ fn settle(
         Search::Global => AMBIGUOUS,
         Search::Local if is_far(task, &best.candidate) => DOUBTFUL * best.candidate.value,
         // A good guess decides between two places ...
+        Search::Local if task.is_decided => f32::INFINITY,
         Search::Local => UNDECIDED * best.candidate.value,
     };
     if ratio > limit {
