@@ -6,7 +6,7 @@
 //!
 //! There are two:
 //!
-//! - `projective` is the product: one fixed mixture of stages in integers, about 0.3 million instructions a match, with
+//! - `projective` is the product: one fixed mixture of stages in integers, about 0.4 million instructions a match, with
 //!   several starts for bad guesses. It pairs by *projection*: both scans come from the same lidar, so the surface in a
 //!   point's direction is found in a table, without a search.
 //! - [`modular`] is the textbook: every stage a type to choose, in `f32`. Take it to compare, to teach, or where a scene

@@ -2,6 +2,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod converged;
 mod correlative;
 mod degenerate;
 mod field;

@@ -128,6 +128,32 @@ fn mirrored_scans_match_mirrored() {
 }
 
 #[test]
+fn a_lidar_that_turns_the_other_way_finds_the_same() {
+    for sigma in [0.01, 0.03] {
+        let mut noise = Noise(11);
+        for case in 0..40 {
+            let (from, motion, guess) = poses(&mut noise);
+            let mut reference = scan::<360>(from, 1.0, sigma, &mut noise);
+            let mut points = scan::<360>(from * motion, 1.0, sigma, &mut noise);
+            let found = matched(&reference, &points, guess).expect("determined");
+            reference.reverse();
+            points.reverse();
+            let other = matched(&reference, &points, guess).expect("determined");
+            let moved = found.pose.between(other.pose);
+            let c = found.covariance.0;
+            // Other points share a pass: both ends are within `CONVERGED` of the same place, and the ends of windows fall
+            // elsewhere.
+            let allowed = 3.0 * CONVERGED;
+            assert!(
+                moved.distance() < allowed * math::sqrt(c.xx + c.yy)
+                    && math::abs(moved.theta) < allowed * math::sqrt(c.tt),
+                "case {case}, {sigma} m: {moved:?}, {c:?}"
+            );
+        }
+    }
+}
+
+#[test]
 fn the_covariance_holds_at_any_noise() {
     for sigma in [0.01, 0.02, 0.03, 0.05] {
         let mut noise = Noise(3);
