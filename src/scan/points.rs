@@ -266,14 +266,19 @@ impl Deskew {
             x: x as i16,
             y: y as i16,
             bearing: Bearing(math::atan2_turn(y, x)),
-            range: math::isqrt(square) as u16,
+            range: math::isqrt_near(square, u32::from(point.range)) as u16,
         })
     }
 }
 
 /// Product with a Q15 factor, rounded down.
 fn mul_q15(a: i32, q15: i32) -> i32 {
-    ((i64::from(a) * i64::from(q15)) >> 15) as i32
+    // Seldom more than 16 bits (64 mm): a Cortex-M0 has no wider product.
+    if a == i32::from(a as i16) {
+        (a * q15) >> 15
+    } else {
+        ((i64::from(a) * i64::from(q15)) >> 15) as i32
+    }
 }
 
 #[cfg(test)]
