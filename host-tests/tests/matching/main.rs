@@ -5,6 +5,7 @@ mod common;
 mod converged;
 mod correlative;
 mod degenerate;
+mod every_match;
 mod field;
 mod host_cost;
 mod staged;

@@ -32,8 +32,6 @@ mod range_noise;
 pub mod reference;
 mod score;
 mod smoothing;
-#[cfg(test)]
-mod tests;
 mod verdict;
 
 pub(crate) use companions::remove_companions;

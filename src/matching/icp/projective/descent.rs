@@ -8,7 +8,6 @@ use crate::{
             Task,
             accumulate::{self, Gate, Pass},
             fixed_pose::{self, FixedPose},
-            multistart::{Candidate, Refined},
             normal_equations::Sums,
             score,
         },
@@ -31,7 +30,7 @@ const FINE_MOST: u8 = 24;
 /// A match has converged when its last two steps, whose passes took all points between them, are each shorter than this share
 /// of the standard deviation that its covariance tells: what is left of the way then is shorter, and adds nothing to the error.
 /// After the last pass twice as much is let pass: points that change between two lines lead to and fro for ever.
-pub(super) const CONVERGED: f32 = 0.3;
+const CONVERGED: f32 = 0.3;
 /// Points that decide what a converged pose is worth, about.
 const JUDGED: u16 = 120;
 
@@ -40,6 +39,34 @@ const JUDGED: u16 = 120;
 pub(super) struct Reached {
     pub at: FixedPose,
     pub passes: u8,
+}
+
+/// A pose and what it is worth.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Candidate {
+    pub at: FixedPose,
+    /// Passes that led there.
+    pub passes: u8,
+    /// Points that met a line, by those that were judged.
+    pub overlap: u16,
+    /// See [`super::score::Score::value`].
+    pub value: f32,
+}
+
+impl Candidate {
+    pub const fn reached(&self) -> Reached {
+        Reached {
+            at: self.at,
+            passes: self.passes,
+        }
+    }
+}
+
+/// A converged candidate.
+pub(super) struct Refined {
+    pub candidate: Candidate,
+    /// What the last passes knew.
+    pub sums: Sums,
 }
 
 /// A Gauss–Newton step.

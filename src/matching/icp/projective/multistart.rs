@@ -5,32 +5,14 @@ use crate::{
     matching::{
         MatchError,
         icp::projective::{
-            Search, Task, descent::Reached, fixed_pose::FixedPose, normal_equations::Sums,
+            Search, Task,
+            descent::{Candidate, Refined},
+            fixed_pose::FixedPose,
+            normal_equations::Sums,
         },
     },
     math,
 };
-
-/// A pose and what it is worth.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Candidate {
-    pub at: FixedPose,
-    /// Passes that led there.
-    pub passes: u8,
-    /// Points that met a line, by those that were judged.
-    pub overlap: u16,
-    /// See [`super::score::Score::value`].
-    pub value: f32,
-}
-
-impl Candidate {
-    const fn reached(&self) -> Reached {
-        Reached {
-            at: self.at,
-            passes: self.passes,
-        }
-    }
-}
 
 /// What [`search`] settled on.
 pub(super) struct Best {
@@ -180,35 +162,26 @@ fn worth(task: &Task<'_>, c: &Candidate, pull: f32) -> f32 {
     c.value - pull * moved * moved
 }
 
-/// A converged candidate.
-pub(super) struct Refined {
-    pub candidate: Candidate,
-    /// What the last passes knew.
-    pub sums: Sums,
+/// Whether no other start is needed.
+fn is_sure(task: &Task<'_>, converged: &Refined) -> bool {
+    let found = &converged.candidate;
+    // Far from a guess that is worth little another place may look the same.
+    let elsewhere = task.config.search == Search::Global && is_far(task, found);
+    found.value >= SURE && !elsewhere
+        || found.value >= SURE_NEAR
+            && found.at.distance(task.start) < NEARBY
+            && is_sharp(task, converged)
 }
 
-impl Refined {
-    /// Whether no other start is needed.
-    fn is_sure(&self, task: &Task<'_>) -> bool {
-        let found = &self.candidate;
-        // Far from a guess that is worth little another place may look the same.
-        let elsewhere = task.config.search == Search::Global && is_far(task, found);
-        found.value >= SURE && !elsewhere
-            || found.value >= SURE_NEAR
-                && found.at.distance(task.start) < NEARBY
-                && self.is_sharp(task)
-    }
-
-    /// Whether the place is known better than a range is.
-    fn is_sharp(&self, task: &Task<'_>) -> bool {
-        let sums = &self.sums;
-        let (residual, range) = (sums.residual(), task.sigma as f32 * 1e-3);
-        let curvature = sums.curvature(task.lever_shift, self.candidate.at);
-        curvature.inverse().is_some_and(|spread| {
-            let square = math::max(spread.xx, spread.yy) * sums.inflation() * residual * residual;
-            square < range * range
-        })
-    }
+/// Whether the place is known better than a range is.
+fn is_sharp(task: &Task<'_>, found: &Refined) -> bool {
+    let sums = &found.sums;
+    let (residual, range) = (sums.residual(), task.sigma as f32 * 1e-3);
+    let curvature = sums.curvature(task.lever_shift, found.candidate.at);
+    curvature.inverse().is_some_and(|spread| {
+        let square = math::max(spread.xx, spread.yy) * sums.inflation() * residual * residual;
+        square < range * range
+    })
 }
 
 /// Finds the best candidate: from the guess alone if that is sure, else from starts around what was found and around the
@@ -218,7 +191,7 @@ pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<
         .coarse(task.start, |_| false, observe)
         .and_then(|found| task.fine(found.ok_or(MatchError::Degenerate)?, observe));
     match first {
-        Ok(found) if found.is_sure(task) => Ok(Best {
+        Ok(found) if is_sure(task, &found) => Ok(Best {
             candidate: found.candidate,
             sums: found.sums,
             iterations: found.candidate.passes,

@@ -1,7 +1,17 @@
 //! What holds of every match, whatever the scene.
 
-use super::{descent::CONVERGED, *};
-use crate::{math, scan::Bearing};
+use beamfix::{
+    geometry::Pose,
+    matching::{
+        Match, MatchError,
+        icp::{IcpConfig, Reference, align},
+    },
+    math,
+    scan::{Bearing, ScanPoint},
+};
+
+/// Share of its standard deviation that a match may be from the end of its way.
+const CONVERGED: f32 = 0.3;
 
 /// Walls of a room with a box in it, as ends of segments (m).
 const WALLS: [[f32; 4]; 8] = [
