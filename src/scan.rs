@@ -166,7 +166,7 @@ impl<const N: usize> Scan<N> {
         const LONG: u32 = 50_000;
         let alone = self.end_us.wrapping_sub(self.before_us) > LONG;
         let ahead = self.end_us.wrapping_sub(time_us);
-        if alone && ahead > LONG && ahead < 1 << 31 && self.beams.len() > 1 {
+        if alone && ahead > LONG && ahead < 1 << 31 && self.beams.len() > 2 {
             // Those after it move up; `Vec::remove` could panic.
             let mut next = self.beams.pop();
             let after = self.beams.get_mut(usize::from(self.latest)..);
@@ -178,12 +178,6 @@ impl<const N: usize> Scan<N> {
             // Which of the others is the latest matters only until a later one comes.
             self.latest = 0;
         }
-    }
-
-    /// Beams removed since the scan was cleared, because their times stood alone.
-    #[must_use]
-    pub const fn outliers(&self) -> u16 {
-        self.outliers
     }
 
     /// Whether a beam of this time (µs) is less than 1.04 s younger than the first, or the first itself.
@@ -314,7 +308,7 @@ mod tests {
         for time in [0, 1000, 2000, 203_000, 4000, 5000, 6000] {
             scan.push(beam(0.0, 1.0, time)).expect("room");
         }
-        assert_eq!((scan.len(), scan.outliers()), (6, 1));
+        assert_eq!((scan.len(), scan.outliers), (6, 1));
         assert_eq!(scan.end_us(), 6000);
     }
 

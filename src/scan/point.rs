@@ -13,7 +13,7 @@ pub struct ScanPoint {
     pub y: i16,
     /// Direction from the lidar.
     pub bearing: Bearing,
-    /// Distance from the lidar (mm), at most [`Points::MAX_RANGE_MM`](super::Points::MAX_RANGE_MM).
+    /// Distance from the lidar (mm), at most 32 000.
     pub range: u16,
 }
 

@@ -63,7 +63,7 @@ pub struct Points<const N: usize> {
 
 impl<const N: usize> Points<N> {
     /// Longest range that is taken (mm).
-    pub const MAX_RANGE_MM: u16 = MAX_RANGE_MM;
+    pub(crate) const MAX_RANGE_MM: u16 = MAX_RANGE_MM;
 
     /// No points.
     #[must_use]
