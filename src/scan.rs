@@ -60,37 +60,6 @@ struct Stored {
     quality: u8,
 }
 
-/// Why a beam is not part of a scan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum PushError {
-    /// The scan has room for so many beams.
-    Full {
-        /// How many.
-        beams: usize,
-    },
-    /// The beam was measured too long before or after the scan's first one.
-    Apart {
-        /// How long (µs).
-        micros: u32,
-    },
-}
-
-impl core::fmt::Display for PushError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Full { beams } => write!(f, "the scan is full: {beams} beams"),
-            Self::Apart { micros } => write!(
-                f,
-                "the beam was measured {micros} µs from the scan's first one, at most 1.04 s belong together"
-            ),
-        }
-    }
-}
-
-impl core::error::Error for PushError {}
-
 impl<const N: usize> Scan<N> {
     /// No beams.
     #[must_use]
@@ -115,9 +84,9 @@ impl<const N: usize> Scan<N> {
     /// another order than that of time.
     ///
     /// # Errors
-    /// A scan that is full, or a beam that was measured more than 1.04 s before or after another one of the scan: a clock
-    /// that jumped, or another revolution.
-    pub fn push(&mut self, beam: Beam) -> Result<(), PushError> {
+    /// 0 for a scan that is full; how long (µs) from the scan's first beam one was measured that is more than 1.04 s from
+    /// another one: a clock that jumped, or another revolution.
+    pub fn push(&mut self, beam: Beam) -> Result<(), u32> {
         if self.beams.is_empty() {
             (self.start_us, self.end_us) = (beam.time_us, beam.time_us);
             (self.latest, self.before_us) = (0, beam.time_us);
@@ -131,7 +100,7 @@ impl<const N: usize> Scan<N> {
         let span = self.end_us.wrapping_sub(self.start_us);
         if span.wrapping_add(earlier).max(after) >> 4 > u32::from(u16::MAX) {
             let micros = earlier.max(after);
-            return Err(PushError::Apart { micros });
+            return Err(micros);
         }
         let stored = Stored {
             bearing: beam.bearing,
@@ -139,8 +108,7 @@ impl<const N: usize> Scan<N> {
             age: (after >> 4) as u16,
             quality: beam.quality,
         };
-        let full = PushError::Full { beams: N };
-        self.beams.push(stored).map_err(|_| full)?;
+        self.beams.push(stored).map_err(|_| 0_u32)?;
         if earlier > 0 {
             // What was the first beam is not any more: all others are older by that much.
             if let Some((_, others)) = self.beams.split_last_mut() {
@@ -267,7 +235,7 @@ mod tests {
                 .expect("room");
         }
         let late = beam(3.0, 1.0, 0);
-        assert_eq!(scan.push(late), Err(PushError::Full { beams: 3 }));
+        assert_eq!(scan.push(late), Err(0));
         let times: [u32; 3] = core::array::from_fn(|k| scan.beams().nth(k).expect("beam").time_us);
         assert_eq!(
             times,
@@ -318,15 +286,12 @@ mod tests {
         scan.push(beam(0.0, 1.0, 7_000_000)).expect("room");
         for time in [2_000_000, 12_000_000] {
             let micros = 5_000_000;
-            assert_eq!(
-                scan.push(beam(0.0, 1.0, time)),
-                Err(PushError::Apart { micros })
-            );
+            assert_eq!(scan.push(beam(0.0, 1.0, time)), Err(micros));
         }
         // Together they would span more than a scan can.
         scan.push(beam(0.0, 1.0, 7_600_000)).expect("room");
         let early = scan.push(beam(0.0, 1.0, 6_400_000));
-        assert_eq!(early, Err(PushError::Apart { micros: 600_000 }));
+        assert_eq!(early, Err(600_000));
         assert_eq!(scan.len(), 2);
     }
 }
