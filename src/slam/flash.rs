@@ -155,9 +155,9 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         let banks = banks::<F>(&range)?;
         let aligned = banks
             .iter()
-            .all(|bank| bank.start as usize % F::ERASE_SIZE == 0)
-            && range.end as usize % F::ERASE_SIZE == 0;
-        if !aligned || F::WRITE_SIZE > PAGE || PAGE % F::WRITE_SIZE != 0 {
+            .all(|bank| (bank.start as usize).is_multiple_of(F::ERASE_SIZE))
+            && (range.end as usize).is_multiple_of(F::ERASE_SIZE);
+        if !aligned || F::WRITE_SIZE > PAGE || !PAGE.is_multiple_of(F::WRITE_SIZE) {
             return Err(StorageError::Unaligned);
         }
         let counts = self.counts();
@@ -240,7 +240,7 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
 fn banks<F: ReadNorFlash>(range: &Range<u32>) -> Result<[Range<u32>; 2], StorageError<F::Error>> {
     let size = range.end.saturating_sub(range.start) / 2;
     let middle = range.start + size;
-    let aligned = PAGE % F::READ_SIZE == 0 && size as usize % PAGE == 0;
+    let aligned = PAGE.is_multiple_of(F::READ_SIZE) && (size as usize).is_multiple_of(PAGE);
     match aligned && size as usize > PAGE {
         true => Ok([range.start..middle, middle..range.end]),
         false => Err(StorageError::Unaligned),
