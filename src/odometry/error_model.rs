@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn good_wheels_are_believed_more_and_bad_ones_less() {
-        let alternating = |k: u32| if k % 2 == 0 { 1.0 } else { -1.0 };
+        let alternating = |k: u32| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         // Matches that are 3 mm off to and fro, on exact wheels.
         let exact = learned(|k| 0.002 * alternating(k));
         assert!(exact < 0.1, "{exact}");

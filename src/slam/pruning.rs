@@ -265,9 +265,9 @@ mod tests {
         assert!(gap.distance() < 1e-5, "{left:?}");
         let Covariance(told) = left.information.covariance().expect("definite");
         // Headings add; and the first one's carries the second step of 1 m.
-        let heading = 0.005f32.powi(2) + 0.01f32.powi(2);
+        let heading = 0.005_f32 * 0.005 + 0.01 * 0.01;
         assert!((told.tt - heading).abs() < 1e-3 * heading, "{told:?}");
-        let least = 0.01f32.powi(2) + 0.02f32.powi(2);
+        let least = 0.01_f32 * 0.01 + 0.02_f32 * 0.02;
         assert!(
             told.xx >= 0.99 * least && told.xx + told.yy < 2.2 * least,
             "{told:?}"

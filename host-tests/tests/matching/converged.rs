@@ -45,7 +45,7 @@ fn a_match_of_a_match_moves_nothing() {
             let Ok(first) = run(pair.guess) else { continue };
             matches += 1;
             let covariance = first.covariance.0;
-            let sigma = math::sqrt(covariance.xx.max(covariance.yy));
+            let sigma = math::sqrt(math::max(covariance.xx, covariance.yy));
             let stays = run(first.pose)
                 .is_ok_and(|again| first.pose.between(again.pose).distance() < sigma);
             if !stays {

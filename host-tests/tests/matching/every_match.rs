@@ -104,8 +104,8 @@ fn a_match_of_a_match_moves_nothing() {
         // Two ends within `CONVERGED` of the same place, each with as much again left of the way.
         let allowed = 4.0 * CONVERGED;
         assert!(
-            math::abs(moved.x) < allowed * sigma(covariance.xx.max(covariance.yy))
-                && math::abs(moved.y) < allowed * sigma(covariance.xx.max(covariance.yy))
+            math::abs(moved.x) < allowed * sigma(math::max(covariance.xx, covariance.yy))
+                && math::abs(moved.y) < allowed * sigma(math::max(covariance.xx, covariance.yy))
                 && math::abs(moved.theta) < allowed * sigma(covariance.tt),
             "case {case}: {moved:?}, {covariance:?}"
         );
