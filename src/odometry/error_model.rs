@@ -57,7 +57,7 @@ pub(super) fn skew(
         Source::Wheels => 0.25,
         Source::Velocity => 0.5,
     };
-    // 1, -2 and 1 times a match's error.
+    /// Variances of a match in a change of velocity, which is 1, -2 and 1 times a match's error.
     const NOISE: f32 = 6.0;
     let rest = |change: f32, noise: f32| {
         let change = duration * change;

@@ -33,6 +33,7 @@ fn outer([x, y, t]: [f32; 3]) -> Sym3 {
 
 /// A covariance with as much added to every direction as rounding takes from it where another one is much larger.
 fn invertible(covariance: &Sym3) -> Sym3 {
+    /// What rounding takes from a small direction, as a share of all: some units in the last place of an `f32`.
     const ROUNDING: f32 = 2e-6;
     let most = ROUNDING * (covariance.xx + covariance.yy + covariance.tt);
     // A rotation is counted at 3 m.

@@ -209,7 +209,7 @@ mod tests {
         step: f32,
         count: usize,
         range: impl Fn(usize) -> u16,
-    ) -> Vec<ScanPoint, 720> {
+    ) -> Vec<ScanPoint, 1440> {
         let points = (0..count).map(|k| {
             let bearing = first + (k as f32 * step) as i32;
             ScanPoint::at(Bearing(bearing as u16), range(k))

@@ -40,10 +40,15 @@ pub(super) struct Meeting {
 /// Costs of the pieces of work in hundreds of instructions of a Cortex-M4F, for the tier of 192 KB, as measured on a
 /// recorded log: about what nine in ten cost. A match that searches is the largest.
 mod cost {
+    /// Looking for keyframes that may see the same place.
     pub const LOOK: u32 = 2_500;
+    /// Showing a keyframe in the virtual scan.
     pub const SHOW: u32 = 10_000;
+    /// Matching against what is seen there.
     pub const MEET: u32 = 6_000;
+    /// Matching where the guess may be far off.
     pub const MEET_LOOSE: u32 = 25_000;
+    /// Weighing a keyframe.
     pub const WEIGH: u32 = 7_000;
 }
 /// Keyframes looked at again between one new keyframe and the next.

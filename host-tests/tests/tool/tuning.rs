@@ -33,6 +33,17 @@ fn every_constant_is_found_with_its_meaning() {
 }
 
 #[test]
+fn the_page_of_constants_is_what_the_source_says() {
+    let page = tuning::page(&tuning::all(source()).expect("the library's source"));
+    let kept = source().join("../docs/constants.md");
+    let kept = fs::read_to_string(kept).expect("docs/constants.md");
+    assert!(
+        page.trim() == kept.trim(),
+        "docs/constants.md is old: cargo run --release -- tune --table > docs/constants.md"
+    );
+}
+
+#[test]
 fn one_number_is_replaced_and_nothing_else() {
     let constants = tuning::all(source()).expect("the library's source");
     let constant = tuning::named(&constants, "degeneracy.rs:GUESS_SIGMA").expect("a constant");

@@ -185,6 +185,7 @@ impl<'a> Projection<'a> {
     /// The line at the place of the last point's tells how far off that is, to first order: enough for a few lines, and
     /// for no more. Farther off, the direction is worked out.
     pub fn line(&mut self, point: &ScanPoint, placed: Placed) -> Option<&'a Line> {
+        /// Lines that the last point's parallax is good for.
         const NEAR: i32 = 2;
         let bins = self.lines.len() as u32;
         let (x, y) = (placed.x >> 4, placed.y >> 4);
@@ -211,7 +212,7 @@ impl<'a> Projection<'a> {
 
 /// Weighted distance of a point from its line (1/16 mm) and its weight (Q8); `None` beyond the gate or 8 m away.
 pub(super) fn residual(line: &Line, placed: Placed, gate: Gate) -> Option<(i32, i32)> {
-    // Below 2¹⁷ the products with 13-bit normals stay in 32 bits.
+    /// 8 m in 1/16 mm: below it the products with 13-bit normals stay in 32 bits.
     const FAR: i32 = 1 << 17;
     let (dx, dy) = (
         placed.x - (i32::from(line.qx) << 4),

@@ -93,7 +93,7 @@ impl Pace {
 
     /// More of a step that leads on as the last one did, less of one that leads back.
     fn adapted(&mut self, [x, y, turn]: [f32; 3]) -> [f32; 3] {
-        // 3 m in 1/16 mm.
+        /// A rotation is counted at 3 m (1/16 mm).
         const LEVER: f32 = 48_000.0;
         let [lx, ly, lt] = self.last;
         let along = x * lx + y * ly + LEVER * LEVER * turn * lt;

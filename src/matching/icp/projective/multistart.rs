@@ -313,7 +313,7 @@ fn is_far(task: &Task<'_>, found: &Candidate) -> bool {
 
 /// Starts moved along the direction that a candidate knows least of: where walls leave it open, local minima lie along it.
 fn slide(task: &Task<'_>, race: &mut Race, found: &Refined) {
-    // Makes a heading comparable with a distance, as everywhere here (m).
+    /// Makes a heading comparable with a distance, as everywhere here (m).
     const LEVER: f32 = 3.0;
     let curvature = found.sums.curvature(task.lever_shift, found.candidate.at);
     let [(least, [x, y, t]), _, _] = curvature.theta_scaled(1.0 / LEVER).eigen();
