@@ -51,8 +51,8 @@ const PIECE_US: u32 = 2_000;
 
 /// Most beams of a revolution; further ones are refused and counted. An LD06 sends 450 at 10 Hz.
 pub const BEAMS: usize = 456;
-/// The same on a board with 16 KB of RAM: the last 20 of a revolution, 16°, are given up so that the stack fits too.
-pub const SMALL_BEAMS: usize = 430;
+/// The same on a board with 16 KB of RAM: the last 38 of a revolution, 30°, are given up so that the stack fits too.
+pub const SMALL_BEAMS: usize = 412;
 
 /// The application as the boards run it.
 pub type Board = App<BEAMS>;

@@ -41,7 +41,7 @@
 
 // The same for objects of the functions whose names end in `_small`, for a microcontroller with 16 KB of RAM: of an LD06's 450
 // beams the last 20, or 16 degrees, are given up.
-#define BEAMFIX_SMALL_BEAMS 430
+#define BEAMFIX_SMALL_BEAMS 412
 
 // Memory for odometry with any lidar (bytes).
 #define BEAMFIX_ODOMETRY_BYTES 36600

@@ -14,7 +14,7 @@ pub const BEAMFIX_ALIGN: usize = 8;
 pub const BEAMFIX_BEAMS: usize = 1100;
 /// The same for objects of the functions whose names end in `_small`, for a microcontroller with 16 KB of RAM: of an LD06's 450
 /// beams the last 20, or 16 degrees, are given up.
-pub const BEAMFIX_SMALL_BEAMS: usize = 430;
+pub const BEAMFIX_SMALL_BEAMS: usize = 412;
 /// Memory for odometry with any lidar (bytes).
 pub const BEAMFIX_ODOMETRY_BYTES: usize = 36_600;
 /// Memory for odometry with BEAMFIX_SMALL_BEAMS (bytes), with any lidar.
