@@ -200,11 +200,13 @@ impl<const K: usize, const E: usize> Graph<K, E> {
     }
 
     /// Number of the next node.
+    #[cfg(feature = "embedded-storage")]
     pub(super) const fn next_id(&self) -> u32 {
         self.next_id
     }
 
     /// Puts a node where none is; whether that is a place.
+    #[cfg(feature = "embedded-storage")]
     pub(super) fn put(&mut self, slot: Slot, node: Node) -> bool {
         match self.nodes.get_mut(usize::from(slot)) {
             Some(free) if !free.used => {
@@ -217,6 +219,7 @@ impl<const K: usize, const E: usize> Graph<K, E> {
     }
 
     /// Sets the number of the next node.
+    #[cfg(feature = "embedded-storage")]
     pub(super) const fn set_next_id(&mut self, next_id: u32) {
         self.next_id = next_id;
     }

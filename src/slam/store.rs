@@ -79,12 +79,14 @@ impl<const B: usize> PackedScan<B> {
     }
 
     /// All that it is, as words: 3 + B.
+    #[cfg(feature = "embedded-storage")]
     pub(super) fn words(&self) -> impl Iterator<Item = u16> + '_ {
         let head = [self.first, self.span, self.unit];
         head.into_iter().chain(self.cells.iter().copied())
     }
 
     /// The same, to be set.
+    #[cfg(feature = "embedded-storage")]
     pub(super) fn words_mut(&mut self) -> impl Iterator<Item = &mut u16> {
         let head = [&mut self.first, &mut self.span, &mut self.unit];
         head.into_iter().chain(&mut self.cells)
