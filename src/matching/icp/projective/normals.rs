@@ -59,7 +59,7 @@ impl Scale {
     fn new(points: &[ScanPoint], bins: usize) -> Self {
         let count = points.len().max(1);
         let mut gap = Gap::WALL;
-        let two_beams = (2 * 65_536 / count as u32).min(WIDEST_GAP) as u16;
+        let two_beams = (2 * 65_536 / (count as u32).max(1)).min(WIDEST_GAP) as u16;
         gap.widest = gap.widest.max(two_beams);
         let sigma = u32::from(range_noise::sigma(points, gap.widest));
         // Neighbours of one surface are one range apart, whose noise is that of two.
