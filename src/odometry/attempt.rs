@@ -233,7 +233,7 @@ impl<const N: usize> Odometry<N> {
     /// Matches the points against the keyframe, starting from where the robot should be.
     #[inline(never)]
     pub(super) fn try_match(&self, predicted: Pose, prior: &Prior) -> Result<Match, Refusal> {
-        let needed = 2 * self.config.icp.min_inliers;
+        let needed = self.config.icp.min_inliers.saturating_mul(2);
         let points = self.deskewed.points.as_slice();
         if self.counters.keyframes == 0 {
             let found = points.len() as u16;
