@@ -19,18 +19,6 @@ const STANDING: f32 = 0.1;
 /// ten thousand is larger by chance.
 pub(super) const MAX_DIFFERENCE: f32 = 21.0;
 
-/// `v vᵀ`.
-fn outer([x, y, t]: [f32; 3]) -> Sym3 {
-    Sym3 {
-        xx: x * x,
-        xy: x * y,
-        xt: x * t,
-        yy: y * y,
-        yt: y * t,
-        tt: t * t,
-    }
-}
-
 /// A covariance with as much added to every direction as rounding takes from it where another one is much larger.
 fn invertible(covariance: &Sym3) -> Sym3 {
     /// What rounding takes from a small direction, as a share of all: some units in the last place of an `f32`.
@@ -90,7 +78,7 @@ impl<const N: usize> Odometry<N> {
             let [x, y, t] = degenerate.direction;
             let turned = heading * Pose::new(x, y, 0.0);
             let along = [turned.x, turned.y, t / degenerate.lever];
-            r = r.plus(&outer(along).scaled(30.0 * (p.xx + p.yy + p.tt)));
+            r = r.plus(&Sym3::outer(along).scaled(30.0 * (p.xx + p.yy + p.tt)));
         } else {
             let information = Covariance(found.information.0).rotated(heading).0;
             let ([ux, uy], share) = weakest(&information);
@@ -103,7 +91,7 @@ impl<const N: usize> Odometry<N> {
                     // Nearer to what moves along than to the world, by more than the match's noise.
                     let sigma = math::sqrt(own.quadratic([ux, uy, 0.0]));
                     if math::abs(along) > 0.25 * math::abs(moved) + 2.0 * sigma {
-                        r = r.plus(&outer([ux, uy, 0.0]).scaled(4.0 * along * along));
+                        r = r.plus(&Sym3::outer([ux, uy, 0.0]).scaled(4.0 * along * along));
                         tracking.doubt = [ux * along, uy * along];
                     }
                 } else if share < COMPANION_ALONE {
@@ -128,7 +116,7 @@ impl<const N: usize> Odometry<N> {
         if difference > MAX_DIFFERENCE {
             self.counters.contradicted = self.counters.contradicted.wrapping_add(1);
             // The prior is as wrong as the match says.
-            p = p.plus(&outer(off));
+            p = p.plus(&Sym3::outer(off));
         }
         let both = invertible(&p).inverse().zip(invertible(&r).inverse());
         let fused = both.and_then(|(prior_information, match_information)| {

@@ -107,7 +107,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let text = constant.replaced(&original, index, value)?;
         trials.push((format!("{value}"), text));
     }
-    trials.dedup();
 
     eprintln!("beamfix: copying the source; the first build takes minutes");
     let copy = Copy::new(checkout)?;

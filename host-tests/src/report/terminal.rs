@@ -5,9 +5,8 @@ use std::io::{self, IsTerminal as _, Stderr, Write as _};
 
 use ratatui::backend::CrosstermBackend;
 use ratatui::layout::{Constraint, Layout};
-use ratatui::style::{Color, Style};
+use ratatui::style::Color;
 use ratatui::symbols::Marker;
-use ratatui::text::Line;
 use ratatui::widgets::canvas::{Canvas, Points};
 use ratatui::widgets::{Block, Paragraph, Wrap};
 use ratatui::{Frame, Terminal, TerminalOptions, Viewport};
@@ -89,8 +88,7 @@ pub fn draw(frame: &mut Frame<'_>, map: &Map) {
             }
         });
     frame.render_widget(canvas, picture);
-    let words_style = Style::default();
-    let caption = Paragraph::new(Line::styled(map.caption.clone(), words_style));
+    let caption = Paragraph::new(map.caption.clone());
     frame.render_widget(caption.wrap(Wrap { trim: true }), words);
 }
 
