@@ -93,7 +93,7 @@ fn a_ring_of_64_beams_follows_a_minute_in_the_flat() {
         // At any time: since matches are refused that have not converged, seeds 12 and 13 are 0.17 and 0.18 m off for a moment.
         farther += u32::from(outcome.largest.0 >= 0.15);
         assert!(
-            outcome.largest.0 < 0.2 && farther <= 3,
+            outcome.largest.0 < 0.2 && farther <= 2,
             "seed {seed}: {outcome:?}, {farther} farther off than 0.15 m"
         );
         // The wheels alone are a metre and 30° off.
