@@ -37,6 +37,7 @@ pub mod solver;
 mod store;
 #[cfg(feature = "embedded-storage")]
 mod stored;
+mod task;
 mod verify;
 mod work;
 
@@ -52,8 +53,8 @@ use self::{
     graph::{Graph, Slot},
     solver::Solver,
     store::PackedScan,
+    task::Work,
     verify::Pending,
-    work::Work,
 };
 use crate::{
     geometry::Pose,
@@ -130,7 +131,7 @@ pub struct Slam<const K: usize, const E: usize, const L: usize, const B: usize, 
     scans: [PackedScan<B>; K],
     solver: Solver<K, L>,
     drift: Drift<K, E>,
-    /// Expected information of each keyframe (256ths of a bit); [`room::UNWEIGHED`] where it is to be weighed anew.
+    /// Expected information of each keyframe (256ths of a bit); [`pruning::UNWEIGHED`] where it is to be weighed anew.
     worth: [u16; K],
     /// What keyframes see together, as points and as lines.
     view: VirtualScan<V>,
@@ -169,7 +170,7 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
             scans: [PackedScan::EMPTY; K],
             solver: Solver::new(),
             drift: Drift::new(),
-            worth: [room::UNWEIGHED; K],
+            worth: [pruning::UNWEIGHED; K],
             view: VirtualScan::new(),
             reference: Reference::new(),
             own: Vec::new(),

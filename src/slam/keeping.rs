@@ -3,7 +3,7 @@
 use super::{
     Last, Placed, Slam,
     graph::{Edge, Kind, Slot},
-    room,
+    pruning,
     store::PackedScan,
 };
 use crate::{
@@ -180,7 +180,7 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         let slot = self.graph.add(pose)?;
         *self.scans.get_mut(usize::from(slot))? = PackedScan::new(points);
         // Those around it are worth less from now on, and stay: it is this one that tells little where they told it all.
-        *self.worth.get_mut(usize::from(slot))? = room::UNWEIGHED;
+        *self.worth.get_mut(usize::from(slot))? = pruning::UNWEIGHED;
         self.counters.keyframes = self.counters.keyframes.wrapping_add(1);
         self.quiet = 0;
         self.stuck = false;

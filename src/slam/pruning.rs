@@ -7,6 +7,9 @@
 use super::graph::{Edge, Graph, Kind, PHI, Slot};
 use crate::{geometry::Pose, linalg::Information, scan::ScanPoint};
 
+/// Worth of a keyframe that is to be weighed.
+pub(super) const UNWEIGHED: u16 = u16::MAX;
+
 /// What is left of a keyframe that was removed: scans placed in its frame are to be placed in another's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -1,9 +1,12 @@
 //! Which keyframe makes room where the memory is full: the one that tells least about the map.
 
-use super::{Merged, Slam, graph::Slot, loops, pruning};
+use super::{
+    Merged, Slam,
+    graph::Slot,
+    loops,
+    pruning::{self, UNWEIGHED},
+};
 
-/// Worth of a keyframe that is to be weighed.
-pub(super) const UNWEIGHED: u16 = u16::MAX;
 /// Worth of one that cannot be removed: more than any other.
 const KEPT: u16 = UNWEIGHED - 1;
 /// Free places below which a keyframe is removed.

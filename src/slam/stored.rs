@@ -10,7 +10,7 @@
 use super::{
     Slam,
     graph::{Edge, Graph, Kind, Node, Slot},
-    room,
+    pruning,
     store::PackedScan,
 };
 use crate::{
@@ -94,7 +94,7 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
     /// Reads keyframes and edges in place of those there are; whether they are ones. Where not, nothing is left.
     pub(super) fn read<R: Read>(&mut self, counts: Counts, from: &mut R) -> Result<bool, R::Error> {
         self.graph = Graph::new();
-        self.worth = [room::UNWEIGHED; K];
+        self.worth = [pruning::UNWEIGHED; K];
         let whole = self.read_all(counts, from)?;
         if !whole {
             self.graph = Graph::new();

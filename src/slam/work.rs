@@ -1,41 +1,11 @@
 //! What is done in the time between scans, in slices.
 
-use heapless::Vec;
-
 use super::{
     Slam,
     graph::{Kind, Slot},
-    loops::{CANDIDATES, Candidate},
     solver::Progress,
+    task::{Meeting, Work},
 };
-
-/// What is being done.
-#[derive(Debug, Clone)]
-pub(super) enum Work {
-    Idle,
-    /// Earlier keyframes that may see the place of this one are to be found.
-    Look(Slot),
-    /// They are to be matched.
-    Meet(Meeting),
-    /// The graph is being solved.
-    Solve,
-    /// This keyframe is to be weighed.
-    Weigh(Slot),
-    /// The keyframe worth least is to be removed, once it is the one that was weighed last.
-    Clear(Option<Slot>),
-}
-
-/// A keyframe that is matched with earlier ones.
-#[derive(Debug, Clone)]
-pub(super) struct Meeting {
-    slot: Slot,
-    /// The likeliest last.
-    candidates: Vec<Candidate, CANDIDATES>,
-    /// Guesses for the last candidate that led nowhere.
-    attempt: u8,
-    /// What is seen around it was made the reference.
-    is_shown: bool,
-}
 
 /// Costs of the pieces of work in hundreds of instructions of a Cortex-M4F, for the tier of 192 KB, as measured on a
 /// recorded log: about what nine in ten cost. A match that searches is the largest.

@@ -25,9 +25,6 @@ const MAX_LINES: usize = 450;
 /// Largest median of all files' lines.
 const MAX_MEDIAN: usize = 200;
 
-/// Circles through a page and its own parts that are left: fewer is better.
-const MAX_PAGES: usize = 2;
-
 fn check(what: &str, broken: &[String]) {
     println!("{what}: {}", broken.len());
     for line in broken {
@@ -107,16 +104,6 @@ fn a_room_imports_only_rooms_below_it() {
     );
 }
 
-/// Whether one of the two is the page of the other: `scan.rs` of `scan/points.rs`.
-fn is_page_and_part(import: &Import) -> bool {
-    let is_page = |page: &str, part: &str| {
-        let folder = page.strip_suffix(".rs").unwrap_or(page);
-        part.strip_prefix(folder)
-            .is_some_and(|rest| rest.starts_with('/'))
-    };
-    is_page(&import.from, &import.to) || is_page(&import.to, &import.from)
-}
-
 /// The circles among imports, with the imports inside them.
 fn told(imports: &[Import]) -> Vec<String> {
     let mut told = Vec::new();
@@ -138,18 +125,7 @@ fn no_files_import_each_other_in_a_circle() {
     let mut imports = Source::read().imports();
     // A unit test may use what stands on the thing that it tests.
     imports.retain(|import| !import.in_tests);
-    let with_pages = told(&imports);
-    // A page may name its parts, and they what it defines: one idea in several files. All the others may not.
-    imports.retain(|import| !is_page_and_part(import));
     check("circles between files", &told(&imports));
-    println!(
-        "circles through a page and its own parts (at most {MAX_PAGES}): {}",
-        with_pages.len()
-    );
-    for circle in &with_pages {
-        println!("  {circle}");
-    }
-    assert!(with_pages.len() <= MAX_PAGES, "{}", with_pages.join("\n"));
 }
 
 /// Groups of files that all reach each other by imports.

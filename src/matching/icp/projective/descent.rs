@@ -5,11 +5,11 @@ use crate::{
     matching::{
         MatchError,
         icp::projective::{
-            Task,
             accumulate::{self, Gate, Pass},
             fixed_pose::{self, FixedPose},
             normal_equations::Sums,
             score,
+            task::Task,
         },
     },
     math,

@@ -5,10 +5,11 @@ use crate::{
     matching::{
         MatchError,
         icp::projective::{
-            Search, Task,
+            config::Search,
             descent::{Candidate, Refined},
             fixed_pose::FixedPose,
             normal_equations::Sums,
+            task::Task,
         },
     },
     math,

@@ -6,7 +6,7 @@ use crate::{
     matching::{
         Match, MatchError, Starts,
         degeneracy::{self, Open},
-        icp::projective::{Task, fixed_pose::FixedPose, multistart::Best},
+        icp::projective::{fixed_pose::FixedPose, multistart::Best, task::Task},
     },
     math,
 };
