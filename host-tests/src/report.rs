@@ -8,4 +8,4 @@ pub mod score;
 pub mod terminal;
 pub mod track;
 
-pub use beamfix_app::hash;
+pub use beamfix_selftest::hash;

@@ -9,16 +9,9 @@
 //! and these functions, and sleeps in between: [`run`] does that for every board with interrupts.
 #![no_std]
 
-#[cfg(feature = "demo")]
-pub mod checks;
 mod config;
-#[cfg(feature = "demo")]
-pub mod demo;
-#[cfg(feature = "demo")]
-pub mod hash;
 #[cfg(feature = "mavlink")]
 pub mod mavlink;
-pub mod pairs;
 mod report;
 pub mod ring;
 pub mod run;
@@ -99,12 +92,14 @@ impl<const N: usize> App<N> {
         &self.report.out
     }
 
-    /// Bytes that report the error of the last pose; empty if there was no new pose.
-    #[cfg(feature = "demo")]
-    pub fn truth(&mut self, demo: &mut demo::Demo) -> &[u8] {
+    /// Bytes that report the error of the last pose; empty if there was no new pose or nobody knows the true one.
+    ///
+    /// `truth` gives the true pose of the robot at a time of the lidar's clock (µs, wrapping).
+    #[cfg(feature = "truth")]
+    pub fn truth(&mut self, truth: impl FnOnce(u32) -> Option<Pose>) -> &[u8] {
         self.report.out.clear();
-        if let Some(at) = self.report.pose_us.take() {
-            self.report.send_truth(demo.truth(at), self.pose());
+        if let Some(truth) = self.report.pose_us.take().and_then(truth) {
+            self.report.send_truth(truth, self.pose());
         }
         &self.report.out
     }

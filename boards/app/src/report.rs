@@ -1,6 +1,6 @@
 //! From steps to bytes to send.
 
-#[cfg(feature = "demo")]
+#[cfg(feature = "truth")]
 use beamfix::geometry::Pose;
 use beamfix::{
     lidar::{Packet as _, ld06},
@@ -11,7 +11,7 @@ use heapless::Vec;
 
 #[cfg(feature = "mavlink")]
 use crate::mavlink;
-#[cfg(feature = "demo")]
+#[cfg(feature = "truth")]
 use crate::telemetry::Truth;
 use crate::{
     AppConfig, Output, link,
@@ -39,7 +39,7 @@ pub(crate) struct Report {
     pub quality: bool,
     pub now_us: u32,
     /// When the last pose was, until its error was told.
-    #[cfg(feature = "demo")]
+    #[cfg(feature = "truth")]
     pub pose_us: Option<u32>,
     /// The motor's speed by the last good packet.
     pub speed_deg_per_s: u16,
@@ -81,7 +81,7 @@ impl Report {
             scans: config.scans,
             quality: config.quality,
             now_us: 0,
-            #[cfg(feature = "demo")]
+            #[cfg(feature = "truth")]
             pose_us: None,
             speed_deg_per_s: 0,
             sequence: 0,
@@ -138,7 +138,7 @@ impl Report {
         if self.quality {
             self.send_quality(pose.sequence, revolution.step);
         }
-        #[cfg(feature = "demo")]
+        #[cfg(feature = "truth")]
         {
             self.pose_us = Some(time_us);
         }
@@ -190,7 +190,7 @@ impl Report {
         self.send(&Telemetry::Scan(Piece::of(packet, start)));
     }
 
-    #[cfg(feature = "demo")]
+    #[cfg(feature = "truth")]
     #[inline(never)]
     pub fn send_truth(&mut self, truth: Pose, pose: Pose) {
         let sequence = self.sequence.wrapping_sub(1);

@@ -35,6 +35,18 @@ pub trait Hardware {
     fn log(&mut self, pose: beamfix::geometry::Pose) {
         let _ = pose;
     }
+
+    /// Where the lidar is simulated on the board: puts the bytes that it has sent until now (µs, wrapping) into its ring.
+    fn simulate<const L: usize>(&mut self, now_us: u32, lidar: &Ring<L>) {
+        let _ = (now_us, lidar);
+    }
+
+    /// Where it is simulated: the true pose of the robot at a time of the lidar's clock (µs, wrapping).
+    #[cfg(feature = "truth")]
+    fn truth(&mut self, time_us: u32) -> Option<beamfix::geometry::Pose> {
+        let _ = time_us;
+        None
+    }
 }
 
 /// Runs the application for ever.
@@ -44,19 +56,16 @@ pub fn run<const N: usize, const L: usize, const C: usize>(
     app: &mut App<N>,
     config: &AppConfig,
     (lidar, commands): (&Ring<L>, &Ring<C>),
-    hardware: &mut impl Hardware,
+    mut hardware: impl Hardware,
     pwm: impl SetDutyCycle,
 ) -> ! {
     let mut supervisor = Supervisor::new(pwm, config.motor, hardware.now_us());
     let reset = hardware.reset();
     hardware.send(app.ready(reset));
-    #[cfg(feature = "demo")]
-    let mut demo = crate::demo::Demo::new();
     loop {
         let now_us = hardware.now_us();
         app.set_time(now_us);
-        #[cfg(feature = "demo")]
-        demo.advance(now_us, |byte| lidar.push(byte));
+        hardware.simulate(now_us, lidar);
         if supervisor.is_due(now_us) {
             let care = supervisor.look(now_us, app.seen());
             app.set_care(care);
@@ -88,8 +97,11 @@ pub fn run<const N: usize, const L: usize, const C: usize>(
                 if !sent.is_empty() {
                     hardware.send(sent);
                     hardware.log(app.pose());
-                    #[cfg(feature = "demo")]
-                    hardware.send(app.truth(&mut demo));
+                    #[cfg(feature = "truth")]
+                    {
+                        let error = app.truth(|time_us| hardware.truth(time_us));
+                        hardware.send(error);
+                    }
                 }
             }
         }

@@ -35,7 +35,7 @@ pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
     defmt::info!("beamfix listens for an LD06 at {} baud", LIDAR_BAUD);
     let mut overruns = 0u32;
     #[cfg(feature = "demo")]
-    let mut demo = beamfix_app::demo::Demo::new();
+    let mut demo = beamfix_selftest::demo::Demo::new();
     loop {
         let now_us = now_us();
         app.set_time(now_us);
@@ -88,7 +88,7 @@ pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
 #[cfg(feature = "demo")]
 async fn simulate<const N: usize>(
     app: &mut App<N>,
-    demo: &mut beamfix_app::demo::Demo,
+    demo: &mut beamfix_selftest::demo::Demo,
     telemetry: &mut impl Write,
     now_us: u32,
 ) {
@@ -107,7 +107,9 @@ async fn simulate<const N: usize>(
             rest = rest.get(taken..).unwrap_or_default();
             if !sent.is_empty() {
                 let _ = telemetry.write_all(sent).await;
-                let _ = telemetry.write_all(app.truth(demo)).await;
+                let _ = telemetry
+                    .write_all(app.truth(|time_us| Some(demo.truth(time_us))))
+                    .await;
                 log(app);
             }
         }

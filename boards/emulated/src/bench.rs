@@ -9,7 +9,7 @@ use beamfix::{
     geometry::Pose,
     scan::{Beam, Bearing, Range, Scan},
 };
-use beamfix_app::pairs::Matcher;
+use beamfix_selftest::pairs::Matcher;
 use semihosting::{
     fs::File,
     io::{self, Write as _},

@@ -1,6 +1,7 @@
 //! The board alone: the lidar is simulated on it, poses and their errors are lines on standard output.
 
-use beamfix_app::{App, AppConfig, CONFIG, Output, demo::Demo, telemetry::Reset};
+use beamfix_app::{App, AppConfig, CONFIG, Output, telemetry::Reset};
+use beamfix_selftest::demo::Demo;
 use semihosting::io::{self, Write as _};
 
 /// Lines for a terminal.
@@ -24,7 +25,7 @@ pub fn run<const N: usize>(app: &mut App<N>) -> io::Result<()> {
             rest = rest.get(taken..).unwrap_or_default();
             if !sent.is_empty() {
                 output.write_all(sent)?;
-                output.write_all(app.truth(&mut demo))?;
+                output.write_all(app.truth(|time_us| Some(demo.truth(time_us))))?;
             }
         }
     }

@@ -152,11 +152,13 @@ fn main() -> ! {
     let mut watchdog = TimerGroup::new(p.TIMG0).wdt;
     watchdog.set_timeout(MwdtStage::Stage0, PATIENCE);
     watchdog.enable();
-    let mut board = Board {
+    let board = Board {
         telemetry,
         watchdog,
     };
-    run(app, &HERE, (&LIDAR, &COMMANDS), &mut board, motor)
+    #[cfg(feature = "demo")]
+    let board = beamfix_selftest::simulated::Simulated::new(board);
+    run(app, &HERE, (&LIDAR, &COMMANDS), board, motor)
 }
 
 /// Wakes the loop up: nothing else to do.

@@ -126,13 +126,15 @@ fn main() -> ! {
     defmt::info!("beamfix listens for an LD06 at {} baud", LIDAR_BAUD);
     let mut watchdog = IndependentWatchdog::new(p.IWDG);
     watchdog.start(1.secs());
-    let mut board = Board {
+    let board = Board {
         telemetry,
         clock,
         watchdog,
         reset,
     };
-    run(APP, &HERE, (&LIDAR, &COMMANDS), &mut board, motor)
+    #[cfg(feature = "demo")]
+    let board = beamfix_selftest::simulated::Simulated::new(board);
+    run(APP, &HERE, (&LIDAR, &COMMANDS), board, motor)
 }
 
 /// Why the chip has started; forgets it, so that the next time tells itself.

@@ -9,7 +9,8 @@ use stm32f4xx_hal as _;
 
 #[embedded_test::tests]
 mod tests {
-    use beamfix_app::{Board, CONFIG, checks};
+    use beamfix_app::{Board, CONFIG};
+    use beamfix_selftest::checks;
 
     fn app() -> &'static mut Board {
         cortex_m::singleton!(: Board = Board::new(CONFIG)).expect("the first to take it")

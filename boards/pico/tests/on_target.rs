@@ -14,7 +14,8 @@ static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_GENERIC_03H;
 
 #[embedded_test::tests]
 mod tests {
-    use beamfix_app::{Board, CONFIG, checks};
+    use beamfix_app::{Board, CONFIG};
+    use beamfix_selftest::checks;
 
     fn app() -> &'static mut Board {
         cortex_m::singleton!(: Board = Board::new(CONFIG)).expect("the first to take it")

@@ -57,13 +57,10 @@ fn main() -> ! {
     Uart::MOTOR.enable();
     Timer.restart();
     wake_now_and_then();
-    run(
-        APP,
-        &HERE,
-        (&LIDAR, &COMMANDS),
-        &mut Mps2::default(),
-        Line::LOW,
-    )
+    let board = Mps2::default();
+    #[cfg(feature = "demo")]
+    let board = beamfix_selftest::simulated::Simulated::new(board);
+    run(APP, &HERE, (&LIDAR, &COMMANDS), board, Line::LOW)
 }
 
 /// For the loop's look; the interrupt itself does nothing.

@@ -150,13 +150,15 @@ pub fn start<const N: usize>(app: &mut App<N>, config: &AppConfig) -> ! {
 
     defmt::info!("beamfix listens for an LD06 at {} baud", LIDAR_BAUD);
     watchdog.start(WATCHDOG_US.micros());
-    let mut board = Board {
+    let board = Board {
         telemetry,
         timer,
         watchdog,
         reset,
     };
-    run(app, config, (&LIDAR, &COMMANDS), &mut board, motor)
+    #[cfg(feature = "demo")]
+    let board = beamfix_selftest::simulated::Simulated::new(board);
+    run(app, config, (&LIDAR, &COMMANDS), board, motor)
 }
 
 fn reset(watchdog: &pac::WATCHDOG) -> Reset {

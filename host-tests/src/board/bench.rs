@@ -5,7 +5,7 @@ use beamfix::{
     geometry::Pose,
     scan::{Beam, Scan},
 };
-use beamfix_app::pairs::{Matcher, Pairs, Staged};
+use beamfix_selftest::pairs::{Matcher, Pairs, Staged};
 use serde::{Deserialize, Serialize};
 
 use super::{

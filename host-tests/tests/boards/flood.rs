@@ -1,6 +1,6 @@
 //! The firmware's own loop under a flood of questions: the lidar loses nothing, and every revolution gets its pose.
 //!
-//! The lidar is the demo's, which the loop itself lets send by the board's clock.
+//! The lidar is the demo's, simulated by the board's clock.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -11,6 +11,7 @@ use beamfix_app::{
     run::{Hardware, NoPwm, run},
     telemetry::Telemetry,
 };
+use beamfix_selftest::simulated::Simulated;
 use host_tests::board::commands::Commands;
 
 /// What leaves, and what commands come in at: 92 bytes a millisecond.
@@ -81,7 +82,7 @@ fn a_flood_of_questions_costs_no_pose() {
     for questions in [frame, vec![0]] {
         let (lidar, commands) = (Ring::<2048>::new(), Ring::<2048>::new());
         let (mut sent, mut fed) = (Vec::new(), 0);
-        let mut board = Board {
+        let board = Simulated::new(Board {
             us: 0,
             commands: &commands,
             questions,
@@ -89,10 +90,10 @@ fn a_flood_of_questions_costs_no_pose() {
             arrived_ms: 0,
             sent: &mut sent,
             fed: &mut fed,
-        };
+        });
         let mut app = Box::new(App::<BEAMS>::new(CONFIG));
         let over = catch_unwind(AssertUnwindSafe(|| {
-            run(&mut *app, &CONFIG, (&lidar, &commands), &mut board, NoPwm)
+            run(&mut *app, &CONFIG, (&lidar, &commands), board, NoPwm)
         }));
         assert!(over.is_err_and(|over| over.is::<Over>()));
         let mut receiver = Receiver::new();

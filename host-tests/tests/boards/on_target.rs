@@ -2,7 +2,8 @@
 
 use std::{fs, path::Path};
 
-use beamfix_app::{App, BEAMS, CONFIG, demo::Demo, demo::FIRST_POSES};
+use beamfix_app::{App, BEAMS, CONFIG};
+use beamfix_selftest::demo::{Demo, FIRST_POSES};
 use host_tests::board::{
     STM32F4,
     emulator::run_test,
@@ -17,7 +18,7 @@ fn the_poses_that_a_board_proves_itself_by_are_the_hosts() {
     let found = FIRST_POSES.find(&mut app, &mut Demo::new());
     assert_eq!(
         found, FIRST_POSES.hash,
-        "{found:#x}: if poses changed on purpose, `FIRST_POSES` in boards/app/src/demo.rs"
+        "{found:#x}: if poses changed on purpose, `FIRST_POSES` in boards/selftest/src/demo.rs"
     );
 }
 

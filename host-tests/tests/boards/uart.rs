@@ -3,7 +3,8 @@
 //! Three minutes on each board (a quarter of an hour in all):
 //! `cargo test --release --test boards_uart -- --ignored --nocapture`
 
-use beamfix_app::{BEAMS, checks, demo::Demo, telemetry::Telemetry};
+use beamfix_app::{BEAMS, telemetry::Telemetry};
+use beamfix_selftest::{checks, demo::Demo};
 use beamfix_sim::encoder::damage;
 use host_tests::board::{
     BOARDS, Board, Replay, STM32F4,

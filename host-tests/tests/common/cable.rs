@@ -4,7 +4,8 @@ use beamfix::{
     geometry,
     lidar::ld06::{FRAME, check_code},
 };
-use beamfix_app::{demo::Demo, telemetry::Pose};
+use beamfix_app::telemetry::Pose;
+use beamfix_selftest::demo::Demo;
 
 /// Time between two packets (µs).
 pub const PACKET_US: u64 = 12 * 222;

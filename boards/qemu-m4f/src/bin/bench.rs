@@ -2,8 +2,8 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::pairs::Pairs;
 use beamfix_emulated::{bench::Bench, finish, stack::Stack};
+use beamfix_selftest::pairs::Pairs;
 use qemu_m4f::clock::Timer;
 
 #[cortex_m_rt::entry]

@@ -3,13 +3,15 @@
 //!
 //! In integers, so that a board without a floating point unit keeps up with it, and everywhere the same bytes.
 
-use crate::{App, hash::PoseHash};
 use beamfix::{
     geometry::Pose,
     lidar::ld06::{FRAME, POINTS, check_code},
     math,
     scan::Bearing,
 };
+use beamfix_app::App;
+
+use crate::hash::PoseHash;
 
 /// A wall along x or y (mm): what a robot meets between `from` and `to`.
 struct Wall {

@@ -3,14 +3,9 @@
 
 use heapless::Vec;
 
-use crate::{
-    App,
-    command::Command,
-    demo::{Demo, FIRST_POSES},
-    link,
-    ring::Ring,
-    telemetry::Telemetry,
-};
+use beamfix_app::{App, command::Command, link, ring::Ring, telemetry::Telemetry};
+
+use crate::demo::{Demo, FIRST_POSES};
 
 /// The simulated lidar's bytes through the whole firmware: the poses have the bits that every machine finds.
 pub fn poses_have_the_same_bits_as_everywhere<const N: usize>(app: &mut App<N>) {
