@@ -24,10 +24,12 @@ pub fn report(json: bool, value: &Value, text: &str) -> Result<()> {
     }
 }
 
-/// A bar on stderr; nothing where stderr is no terminal.
+/// A bar on stderr with rate and time left; nothing where stderr is no terminal.
 pub fn progress(steps: usize, doing: &'static str) -> ProgressBar {
     let bar = ProgressBar::new(steps as u64).with_message(doing);
-    if let Ok(style) = ProgressStyle::with_template("{msg:>10} {bar:40} {pos}/{len}  {elapsed}") {
+    if let Ok(style) =
+        ProgressStyle::with_template("{msg:>10} {bar:40} {pos}/{len}  {per_sec}  {eta} left")
+    {
         bar.set_style(style);
     }
     bar
