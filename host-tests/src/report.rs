@@ -3,6 +3,9 @@
 pub mod mcap;
 pub mod picture;
 pub mod relations;
+pub mod rosbag;
+pub mod run;
+pub mod sample;
 pub mod scene;
 pub mod score;
 pub mod terminal;

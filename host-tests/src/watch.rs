@@ -281,6 +281,7 @@ impl<W: Write> Watch<W> {
             world: None,
             points: self.points.clone(),
             paths,
+            ellipses: None,
         }
     }
 }

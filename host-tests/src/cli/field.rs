@@ -81,7 +81,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             shape.resolution(),
             args.sigma
         ),
-        field: &field,
+        field: field.as_slice(),
+        path: Vec::new(),
     };
     picture::save(&heat, &image)?;
     let count = |cell: Cell| {

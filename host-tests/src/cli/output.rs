@@ -5,7 +5,9 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
+use clap::ValueEnum;
 use host_tests::formats::ros_map;
+use host_tests::report::run::Format;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
 
@@ -33,6 +35,24 @@ pub fn progress(steps: usize, doing: &'static str) -> ProgressBar {
         bar.set_style(style);
     }
     bar
+}
+
+/// How a run is recorded in its folder.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+pub enum RecordingFormat {
+    /// run.mcap with Foxglove's schemas.
+    Foxglove,
+    /// A ROS 2 bag: the folder bag, with its metadata.yaml and an MCAP file.
+    Ros2,
+}
+
+impl From<RecordingFormat> for Format {
+    fn from(format: RecordingFormat) -> Self {
+        match format {
+            RecordingFormat::Foxglove => Self::Foxglove,
+            RecordingFormat::Ros2 => Self::Ros2,
+        }
+    }
 }
 
 /// Creates a file for writing.

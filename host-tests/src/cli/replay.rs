@@ -22,7 +22,14 @@ use args::Mode;
 /// Replays the log.
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.check()?;
-    let written = [args.trajectory.as_deref(), args.picture.as_deref()];
+    let inside = |name: &str| args.out.as_ref().map(|folder| folder.join(name));
+    let recorded = ["run.mcap", "bag/run_0.mcap", "seen.yaml", "seen.pgm"].map(inside);
+    let written = [&args.trajectory, &args.picture].map(Option::as_deref);
+    let written: Vec<_> = recorded
+        .iter()
+        .map(Option::as_deref)
+        .chain(written)
+        .collect();
     let map = args.map.as_deref().unwrap_or(&args.log);
     output::spare(&[&args.log, map], &written)?;
     let mut log = formats::read_with(&args.log, &args.options())?;

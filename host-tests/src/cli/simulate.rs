@@ -23,21 +23,24 @@ use host_tests::formats::carmen;
 use host_tests::formats::ros::bag::ATTACHMENT;
 use host_tests::formats::{Log, ros_map};
 use host_tests::pipeline::{config, follow, sparse_odometry};
-use host_tests::report::mcap::McapFile;
-use host_tests::report::picture;
+use host_tests::report::run::{Run, Setup, Titles};
 use host_tests::{size, sized};
 use serde_json::json;
 
-use super::output;
+use super::output::{self, RecordingFormat};
 use super::prior::Prior;
-use host_tests::report::track::{At, Track};
+use host_tests::report::track::At;
 
 /// Drive a simulated robot through a flat or another place: ray casting, lidar bytes, driver, matcher, pose.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Where to write map.png, errors.svg, trajectory.txt, truth.txt, run.mcap, and lidar.rec or ring.log for `replay`.
+    /// Where to write pictures (map.png, errors.svg, match.png, match.gif), what was seen as a ROS map (seen.yaml),
+    /// trajectory.txt, truth.txt, a recording, and lidar.rec or ring.log for `replay`.
     #[arg(long, value_name = "DIR", default_value = "target/beamfix")]
     out: PathBuf,
+    /// How the run is recorded: run.mcap for Foxglove and Lichtblick (docs/foxglove.json is its layout), or a ROS 2 bag.
+    #[arg(long, value_enum, default_value_t = RecordingFormat::Foxglove)]
+    recording_format: RecordingFormat,
     /// Seed of all randomness.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -107,13 +110,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             model.name,
         )?
     };
-    let run = Run {
+    let driven = Driven {
         drive,
         moments,
         log,
         packets: summary.packets,
     };
-    sized!(size, turning(args, &settings, run))
+    sized!(size, turning(args, &settings, driven))
 }
 
 /// Where the robot drives: a place that is built in, or described in a file.
@@ -162,7 +165,7 @@ const RECORDING: &str = "lidar.rec";
 const RING_RECORDING: &str = "ring.log";
 
 /// A finished drive, and its scans as the pipeline gets them.
-struct Run {
+struct Driven {
     drive: Drive,
     log: Log,
     /// The robot at the end of each scan.
@@ -171,13 +174,13 @@ struct Run {
 }
 
 /// A lidar that turns, with room for N beams a revolution.
-fn turning<const N: usize>(args: &Args, settings: &Settings, run: Run) -> Result<ExitCode> {
+fn turning<const N: usize>(args: &Args, settings: &Settings, driven: Driven) -> Result<ExitCode> {
     let mount = Mount {
         robot_from_lidar: settings.mount.into(),
         ..Mount::DEFAULT
     };
     let odometry = Odometry::<N>::new(config(mount, N));
-    replay(args, settings, run, odometry, |odometry| {
+    replay(args, settings, driven, odometry, |odometry| {
         odometry.counters().lost
     })
 }
@@ -196,13 +199,13 @@ fn ring(args: &Args, settings: Settings) -> Result<ExitCode> {
     let path = args.out.join(RING_RECORDING);
     fs::write(&path, carmen::written(&log)).with_context(|| path.display().to_string())?;
     let odometry = sparse_odometry(log.mount, RingModel::VL53L5CX.width() as f32);
-    let run = Run {
+    let driven = Driven {
         drive,
         log,
         moments,
         packets: 0,
     };
-    replay(args, &settings, run, odometry, |_| 0)
+    replay(args, &settings, driven, odometry, |_| 0)
 }
 
 /// Side of a cell of a written map (m).
@@ -228,16 +231,16 @@ fn write_map(drive: &Drive, path: &Path) -> Result<()> {
 fn replay<E: Estimator<N, Step = Step>, const N: usize>(
     args: &Args,
     settings: &Settings,
-    run: Run,
+    driven: Driven,
     estimator: E,
     lost: impl Fn(&E) -> u32,
 ) -> Result<ExitCode> {
-    let Run {
+    let Driven {
         drive,
         log,
         moments,
         packets,
-    } = run;
+    } = driven;
     let Some(&origin) = moments.first() else {
         bail!(
             "--seconds {}: not one whole revolution of the lidar",
@@ -247,17 +250,27 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
     if let Some(path) = &args.ros_map {
         write_map(&drive, path)?;
     }
-    let mut mcap = McapFile::create(&args.out.join("run.mcap"), &["estimate", "truth", "wheels"])?;
+    let setup = Setup {
+        origin: origin.truth,
+        mount: Mount {
+            robot_from_lidar: settings.mount.into(),
+            ..Mount::DEFAULT
+        },
+        scans: moments.len(),
+        drawn: DRAWN,
+        has: (true, true),
+        is_sampled: log.capture.is_some(),
+    };
+    let mut run = Run::create(&args.out, args.recording_format.into(), &setup)?;
     let recording = if log.capture.is_some() {
         // So that `replay` takes this file too.
-        mcap.attach(ATTACHMENT, &fs::read(args.out.join(RECORDING))?)?;
+        run.attach(ATTACHMENT, &fs::read(args.out.join(RECORDING))?)?;
         RECORDING
     } else {
         RING_RECORDING
     };
     let mut trajectory = output::create(&args.out.join("trajectory.txt"))?;
     let mut truth = output::create(&args.out.join("truth.txt"))?;
-    let mut track = Track::new(origin.truth, settings.mount.into(), DRAWN);
     let bar = output::progress(moments.len(), "matching");
     let wheels = args.prior == Prior::Odometry;
     let (mut refused, mut keyframes) = (0, 0);
@@ -275,11 +288,12 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
             let at = At {
                 time: now.time,
                 estimate: pose,
+                covariance: Some(step.covariance),
+                is_measured: matches!(step.outcome, Ok(_) | Err(Refusal::First)),
                 truth: Some(true_pose),
                 wheels: Some(wheels),
             };
-            let points = track.push(at, &scan.beams);
-            mcap.push(now.time, &points, &[pose, true_pose, wheels])?;
+            run.push(scan, at)?;
             for (file, pose) in [(&mut trajectory, pose), (&mut truth, true_pose)] {
                 writeln!(file, "{:.6} {} {} {}", now.time, pose.x, pose.y, pose.theta)?;
             }
@@ -288,11 +302,10 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
         },
     )?;
     bar.finish_and_clear();
-    mcap.finish()?;
     trajectory.flush()?;
     truth.flush()?;
 
-    let errors = track.errors();
+    let errors = run.errors();
     let seconds = drive.moments.last().map_or(0.0, |moment| moment.time);
     let caption = format!(
         "{seconds:.0} s, {:.1} m driven; error at the end {:.1} cm, {:.2}°; largest {:.1} cm, {:.2}°",
@@ -311,9 +324,12 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
             .to_string_lossy(),
         args.seed
     );
-    let map = track.map(title.clone(), caption.clone(), Some(drive.world));
-    picture::save(&map, &args.out.join("map.png"))?;
-    picture::save(&track.chart(title), &args.out.join("errors.svg"))?;
+    let titles = Titles {
+        title,
+        caption: caption.clone(),
+    };
+    let (files, remarks) = run.finish(titles, Some(drive.world), None)?;
+    output::remark(&remarks);
 
     let (scans, lost) = (followed.scans, lost(&followed.estimator));
     let value = json!({
@@ -327,7 +343,7 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
     });
     let text = format!(
         "{caption}\nwheels alone: {:.1} cm, {:.2}° at the end\n{} bytes, {} packets, {} scans, {} refused, {} keyframes\n\
-         pose hash {}\nwritten to {}: map.png errors.svg trajectory.txt truth.txt run.mcap {recording}",
+         pose hash {}\nwritten to {}: {} trajectory.txt truth.txt {recording}",
         100.0 * errors.wheels.0,
         errors.wheels.1,
         drive.bytes.len(),
@@ -336,7 +352,8 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
         refused,
         keyframes,
         followed.hash,
-        args.out.display()
+        args.out.display(),
+        files.join(" ")
     );
     output::report(args.json, &value, &text)?;
     Ok(ExitCode::SUCCESS)

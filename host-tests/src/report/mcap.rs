@@ -7,8 +7,11 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use base64::{Engine, prelude::BASE64_STANDARD};
 use beamfix::geometry::{Point, Pose};
+use beamfix::grid::occupancy::{self, Cell};
 use mcap::records::MessageHeader;
 use serde_json::{Value, json};
+
+use crate::formats::ros_map::Map;
 
 /// An MCAP file being written.
 pub struct McapFile {
@@ -18,6 +21,9 @@ pub struct McapFile {
     clouds: u16,
     poses: Vec<(String, u16)>,
     transforms: u16,
+    maps: u16,
+    /// When the last message was written (s).
+    last: f64,
 }
 
 const FRAME: &str = "map";
@@ -39,6 +45,7 @@ impl McapFile {
         };
         let clouds = channel("/points", "foxglove.PointCloud", cloud_schema())?;
         let transforms = channel("/tf", "foxglove.FrameTransform", transform_schema())?;
+        let maps = channel("/map", "foxglove.Grid", grid_schema())?;
         let poses = poses
             .iter()
             .map(|pose| {
@@ -59,6 +66,8 @@ impl McapFile {
             clouds,
             poses,
             transforms,
+            maps,
+            last: 0.0,
         })
     }
 
@@ -83,7 +92,8 @@ impl McapFile {
         points_in_robot: &[Point],
         poses_in_map: &[Pose],
     ) -> Result<()> {
-        let stamp = json!({"sec": seconds as u64, "nsec": (seconds.fract() * 1e9) as u64});
+        self.last = seconds;
+        let stamp = stamp(seconds);
         let data: Vec<u8> = points_in_robot
             .iter()
             .flat_map(|p| [p.x, p.y])
@@ -113,6 +123,26 @@ impl McapFile {
         Ok(())
     }
 
+    /// Writes what was seen as a map: 0 free, 100 occupied, 255 unknown.
+    pub fn push_map(&mut self, map: &Map) -> Result<()> {
+        let shape = map.shape();
+        let value = |&byte: &u8| match occupancy::cell(byte) {
+            Cell::Free => 0,
+            Cell::Occupied => 100,
+            Cell::Unknown => 255u8,
+        };
+        let data: Vec<u8> = map.cells().iter().map(value).collect();
+        let side = shape.resolution();
+        let message = json!({
+            "timestamp": stamp(self.last), "frame_id": FRAME, "pose": pose_json(shape.origin()),
+            "column_count": shape.width(), "cell_size": {"x": side, "y": side},
+            "row_stride": shape.width(), "cell_stride": 1,
+            "fields": [{"name": "occupancy", "offset": 0, "type": 1}],
+            "data": BASE64_STANDARD.encode(data),
+        });
+        self.write(self.maps, self.last, &message)
+    }
+
     /// Closes the file: without this it has no index.
     pub fn finish(mut self) -> Result<()> {
         self.writer
@@ -135,6 +165,10 @@ impl McapFile {
             .write_to_known_channel(&header, bytes.as_bytes())
             .with_context(|| self.name.clone())
     }
+}
+
+fn stamp(seconds: f64) -> Value {
+    json!({"sec": seconds as u64, "nsec": (seconds.fract() * 1e9) as u64})
 }
 
 fn pose_json(pose: Pose) -> Value {
@@ -201,6 +235,21 @@ fn cloud_schema() -> Value {
         "foxglove.PointCloud",
         json!({
             "timestamp": stamp_schema(), "frame_id": {"type": "string"}, "pose": placed_schema(), "point_stride": {"type": "integer"},
+            "fields": {"type": "array", "items": field}, "data": {"type": "string", "contentEncoding": "base64"},
+        }),
+    )
+}
+
+fn grid_schema() -> Value {
+    let field = object(
+        json!({"name": {"type": "string"}, "offset": {"type": "integer"}, "type": {"type": "integer"}}),
+    );
+    titled(
+        "foxglove.Grid",
+        json!({
+            "timestamp": stamp_schema(), "frame_id": {"type": "string"}, "pose": placed_schema(),
+            "column_count": {"type": "integer"}, "cell_size": numbers(&["x", "y"]),
+            "row_stride": {"type": "integer"}, "cell_stride": {"type": "integer"},
             "fields": {"type": "array", "items": field}, "data": {"type": "string", "contentEncoding": "base64"},
         }),
     )

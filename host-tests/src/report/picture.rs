@@ -7,6 +7,8 @@ pub mod heat;
 pub mod map;
 pub mod pair;
 
+use std::fs::File;
+use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Once;
 
@@ -97,6 +99,45 @@ pub fn save(drawing: &impl Drawing, path: &Path) -> Result<()> {
     image
         .save_with_format(path, image::ImageFormat::Png)
         .with_context(name)
+}
+
+/// Draws an animation that runs for ever: a GIF of 216 colours, six steps of each part.
+pub fn animate(frames: &[impl Drawing], path: &Path) -> Result<()> {
+    /// How long a frame is shown, and how long the first and the last (10 ms).
+    const SHOWN: (u16, u16) = (40, 150);
+    let Some(first) = frames.first() else {
+        bail!("{}: nothing to animate", path.display());
+    };
+    use_font();
+    let name = || path.display().to_string();
+    let part = |step: u8| 51 * step;
+    let palette: Vec<u8> = (0..216)
+        .flat_map(|k| [part(k / 36), part(k / 6 % 6), part(k % 6)])
+        .collect();
+    let (width, height) = first.size();
+    let size = (u16::try_from(width)?, u16::try_from(height)?);
+    let file = BufWriter::new(File::create(path).with_context(name)?);
+    let mut encoder = gif::Encoder::new(file, size.0, size.1, &palette).with_context(name)?;
+    encoder
+        .set_repeat(gif::Repeat::Infinite)
+        .with_context(name)?;
+    for (k, frame) in frames.iter().enumerate() {
+        let mut pixels = vec![0; 3 * width as usize * height as usize];
+        let area = BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area();
+        fill(frame, area)?;
+        let step = |part: u8| (part.saturating_add(25)) / 51;
+        let index = |rgb: &[u8]| 36 * step(rgb[0]) + 6 * step(rgb[1]) + step(rgb[2]);
+        let is_end = k == 0 || k + 1 == frames.len();
+        let frame = gif::Frame {
+            width: size.0,
+            height: size.1,
+            delay: if is_end { SHOWN.1 } else { SHOWN.0 },
+            buffer: pixels.chunks_exact(3).map(index).collect(),
+            ..gif::Frame::default()
+        };
+        encoder.write_frame(&frame).with_context(name)?;
+    }
+    Ok(())
 }
 
 fn fill<B: DrawingBackend>(drawing: &impl Drawing, area: DrawingArea<B, Shift>) -> Result<()>

@@ -1,23 +1,60 @@
 //! What a run leaves behind: poses, points and errors, and the pictures of them.
 
+use crate::formats::ros_map::Map as Grid;
 use crate::pipeline::places;
-use crate::report::picture::{chart::Errors as Chart, colour, map::Map, map::Path};
+use crate::report::picture::axes::ellipse;
+use crate::report::picture::chart::{Errors as Chart, Row};
+use crate::report::picture::{colour, map::Ellipses, map::Map, map::Path};
 use crate::report::score;
 use beamfix::geometry::{Point, Pose};
-use beamfix::scan::Beam;
+use beamfix::grid::Shape;
+use beamfix::grid::occupancy::{self, UpdateConfig};
+use beamfix::linalg::Covariance;
+use beamfix::scan::{Beam, Bearing, ScanPoint};
 use beamfix_sim::{TruePose, World};
 
-/// A robot at the end of a scan; all poses in the frame in which it started.
+/// A robot at the end of a scan; all poses in the frame in which it started, or the map's.
 #[derive(Clone, Copy)]
 pub struct At {
     /// Since the start (s).
     pub time: f64,
     /// Where the pipeline puts it.
     pub estimate: Pose,
+    /// How well that is known, if anybody says.
+    pub covariance: Option<Covariance>,
+    /// Whether a match confirms the estimate, or it is the first.
+    pub is_measured: bool,
     /// Where it really was, if anybody knows.
     pub truth: Option<Pose>,
     /// Where its wheels said it was.
     pub wheels: Option<Pose>,
+}
+
+/// Time since the first scan, from a clock of microseconds that overflows.
+#[derive(Debug, Default)]
+pub struct Elapsed {
+    last_us: Option<u32>,
+    us: u64,
+}
+
+impl Elapsed {
+    /// The time (s) at the last of a scan's beams.
+    pub fn at(&mut self, beams: &[Beam]) -> f64 {
+        if let Some(beam) = beams.last() {
+            let before = self.last_us.replace(beam.time_us);
+            self.us += before.map_or(0, |before| u64::from(beam.time_us.wrapping_sub(before)));
+        }
+        self.us as f64 * 1e-6
+    }
+}
+
+/// A scan that is drawn.
+struct Shot {
+    /// Which of [`Track::at`] it belongs to.
+    index: usize,
+    estimate: Pose,
+    /// In the robot's frame.
+    points: Vec<Point>,
 }
 
 /// A run so far.
@@ -28,7 +65,7 @@ pub struct Track {
     /// Every so many scans are drawn.
     drawn: usize,
     at: Vec<At>,
-    points: Vec<[f64; 2]>,
+    shots: Vec<Shot>,
 }
 
 /// Errors in metres and degrees.
@@ -42,6 +79,15 @@ pub struct Errors {
     pub wheels: (f64, f64),
 }
 
+/// About so many ellipses of covariance are drawn.
+const ELLIPSES: usize = 40;
+/// How large an ellipse should be, beside the picture's larger side.
+const SEEN: f64 = 0.02;
+/// Side of a cell of a map of what was seen (m), as map servers have it.
+const CELL: f32 = 0.05;
+/// Longest side of such a map (cells).
+const MAX_CELLS: f64 = 4000.0;
+
 impl Track {
     /// Nothing yet; every `drawn`-th scan will be drawn.
     pub fn new(origin: TruePose, robot_from_lidar: Pose, drawn: usize) -> Self {
@@ -50,7 +96,7 @@ impl Track {
             robot_from_lidar,
             drawn,
             at: Vec::new(),
-            points: Vec::new(),
+            shots: Vec::new(),
         }
     }
 
@@ -63,10 +109,11 @@ impl Track {
         let seconds = before.map_or(0.0, |before| (at.time - before.time) as f32);
         let points = places(beams, motion, seconds, self.robot_from_lidar);
         if self.at.len().is_multiple_of(self.drawn.max(1)) {
-            let placed = points
-                .iter()
-                .map(|&point| self.on_picture(at.estimate * point));
-            self.points.extend(placed.collect::<Vec<_>>());
+            self.shots.push(Shot {
+                index: self.at.len(),
+                estimate: at.estimate,
+                points: points.clone(),
+            });
         }
         self.at.push(at);
         points
@@ -98,25 +145,147 @@ impl Track {
             .into_iter()
             .filter(|path| !path.places.is_empty())
             .collect();
-        Map {
+        let placed = |shot: &Shot| -> Vec<[f64; 2]> {
+            let points = shot.points.iter();
+            points
+                .map(|&point| self.on_picture(shot.estimate * point))
+                .collect()
+        };
+        let mut map = Map {
             title,
             caption,
             world,
-            points: self.points.clone(),
+            points: self.shots.iter().flat_map(placed).collect(),
             paths,
-        }
+            ellipses: None,
+        };
+        let (low, high) = map.limits();
+        let side = (high[0] - low[0]).max(high[1] - low[1]);
+        map.ellipses = self.ellipses(SEEN * side);
+        map
     }
 
-    /// The errors over time.
+    /// Ellipses along the path, enlarged until most of them are about so large (m).
+    fn ellipses(&self, seen: f64) -> Option<Ellipses> {
+        let step = self.shots.len().div_ceil(ELLIPSES).max(1);
+        let of = |shot: &Shot| {
+            let at = self.at.get(shot.index)?;
+            let covariance = at.covariance?;
+            let size = 2.0 * sigma(covariance);
+            (size > 0.0 && size.is_finite()).then_some((at.estimate, covariance, size))
+        };
+        let chosen: Vec<_> = self.shots.iter().step_by(step).filter_map(of).collect();
+        if chosen.is_empty() {
+            return None;
+        }
+        let sizes: Vec<f64> = chosen.iter().map(|(_, _, size)| *size).collect();
+        let wanted = seen / score::quantile(&sizes, 0.5);
+        let scales = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
+        let scale = scales
+            .into_iter()
+            .rev()
+            .find(|scale| *scale <= wanted)
+            .unwrap_or(1.0);
+        let name = if scale > 1.0 {
+            format!("95 % ellipse, {scale} times as large")
+        } else {
+            "95 % ellipse".into()
+        };
+        // One that is larger than the picture says no more than that the robot is lost.
+        let drawn = chosen
+            .iter()
+            .filter(|(_, _, size)| scale * size < 20.0 * seen);
+        let shape = |(pose, covariance, _): &(Pose, Covariance, f64)| {
+            let centre = [f64::from(pose.x), f64::from(pose.y)];
+            let corners = ellipse(centre, *covariance, scale);
+            let place = |[x, y]: [f64; 2]| self.on_picture(Point::new(x as f32, y as f32));
+            corners.into_iter().map(place).collect()
+        };
+        Some(Ellipses {
+            name,
+            shapes: drawn.map(shape).collect(),
+        })
+    }
+
+    /// Error and standard deviation over time.
     pub fn chart(&self, title: String) -> Chart {
-        let error = |at: &At| {
-            let (metres, degrees) = score::error(at.estimate, at.truth?);
-            Some((at.time, 100.0 * metres, degrees))
+        let row = |at: &At| {
+            let error = at.truth.map(|truth| {
+                let (metres, degrees) = score::error(at.estimate, truth);
+                (100.0 * metres, degrees)
+            });
+            let stated = at.covariance.map(|covariance| {
+                let heading = libm::sqrt(f64::from(covariance.0.tt.max(0.0)));
+                (100.0 * sigma(covariance), heading.to_degrees())
+            });
+            Row {
+                time: at.time,
+                error,
+                sigma: stated,
+                is_measured: at.is_measured,
+            }
+        };
+        let has_truth = self.at.iter().any(|at| at.truth.is_some());
+        let caption = if has_truth {
+            "error of the estimate against the truth after every scan, and what the estimate states itself"
+        } else {
+            "what the estimate states itself after every scan; no truth is known"
         };
         Chart {
             title,
-            errors: self.at.iter().filter_map(error).collect(),
+            caption: caption.into(),
+            rows: self.at.iter().map(row).collect(),
         }
+    }
+
+    /// What is free and what is occupied, by the scans that are drawn; `None` where nothing was seen.
+    pub fn grid(&self) -> Option<Grid> {
+        let placed = |shot: &Shot| -> Vec<[f64; 2]> {
+            let place = |&point: &Point| {
+                let place = shot.estimate * point;
+                [f64::from(place.x), f64::from(place.y)]
+            };
+            shot.points.iter().map(place).collect()
+        };
+        let all: Vec<[f64; 2]> = self.shots.iter().flat_map(placed).collect();
+        if all.is_empty() {
+            return None;
+        }
+        let (low, high) = crate::report::picture::axes::bounds(all.into_iter());
+        let corner = low.map(|side| side as f32 - 4.0 * CELL);
+        let cells = |axis: usize| (high[axis] - low[axis]) / f64::from(CELL) + 9.0;
+        if cells(0) > MAX_CELLS || cells(1) > MAX_CELLS {
+            return None;
+        }
+        let origin = Pose::new(corner[0], corner[1], 0.0);
+        let shape = Shape::new(cells(0) as u32, cells(1) as u32, CELL, origin).ok()?;
+        let mut grid = Grid::new(shape, vec![occupancy::UNKNOWN; shape.len()]).ok()?;
+        let config = UpdateConfig {
+            max_range: 32.0,
+            ..UpdateConfig::DEFAULT
+        };
+        for shot in &self.shots {
+            let lidar_from_robot = self.robot_from_lidar.inverse();
+            let seen = |&point: &Point| {
+                let place = lidar_from_robot * point;
+                let bearing = libm::atan2f(place.y, place.x);
+                let range = 1e3 * libm::hypotf(place.x, place.y);
+                (range < 32_000.0)
+                    .then(|| ScanPoint::at(Bearing::from_radians(bearing), range as u16))
+            };
+            let points: Vec<ScanPoint> = shot.points.iter().filter_map(seen).collect();
+            let lidar = shot.estimate * self.robot_from_lidar;
+            occupancy::update(&mut grid, lidar, &points, &config);
+        }
+        Some(grid)
+    }
+
+    /// The estimated path in its own frame (m).
+    pub fn driven(&self) -> Vec<[f64; 2]> {
+        let poses = self.at.iter().map(|at| at.estimate);
+        poses
+            .map(|pose| [f64::from(pose.x), f64::from(pose.y)])
+            .collect()
     }
 
     fn on_picture(&self, point: Point) -> [f64; 2] {
@@ -145,4 +314,11 @@ impl Track {
             places: places.collect(),
         }
     }
+}
+
+/// Standard deviation of a position in the direction in which it is largest (m).
+fn sigma(covariance: Covariance) -> f64 {
+    let [xx, xy, yy] = [covariance.0.xx, covariance.0.xy, covariance.0.yy].map(f64::from);
+    let half = libm::hypot(0.5 * (xx - yy), xy);
+    libm::sqrt((0.5 * (xx + yy) + half).max(0.0))
 }

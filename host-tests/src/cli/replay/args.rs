@@ -6,18 +6,23 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail, ensure};
 use beamfix::geometry::Pose;
+use beamfix::linalg::Covariance;
 use beamfix::scan::Mount;
+use beamfix::sensor_model::likelihood_field::LikelihoodField;
+use beamfix_sim::TruePose;
 use clap::ValueEnum;
 use host_tests::formats::order::Order;
 use host_tests::formats::trajectory::{Format, Trajectory};
-use host_tests::formats::{Log, Options};
+use host_tests::formats::{Log, Options, Recorded};
 use host_tests::report::picture;
+use host_tests::report::run::{Run, Setup, Titles};
+use host_tests::report::track::{At, Elapsed, Track};
 
-use crate::cli::output;
+use crate::cli::output::{self, RecordingFormat};
 use crate::cli::prior::Prior;
 
 /// About so many scans are drawn into a picture.
-pub const DRAWN: usize = 400;
+const DRAWN: usize = 400;
 
 /// Run the firmware's pipeline over a recorded log: CARMEN .log, .lscan, a ROS 2 bag (MCAP, SQLite, or its folder), a
 /// capture of `simulate` (lidar.rec, run.mcap), or a raw serial capture; packed or not.
@@ -59,6 +64,14 @@ pub struct Args {
     /// Write the map here, as a ROS map: this YAML file and a picture beside it. With --mode slam.
     #[arg(long, value_name = "FILE")]
     pub map_out: Option<PathBuf>,
+    /// Write pictures (map.png, errors.svg, match.png, match.gif, with a map field.png), what was seen as a ROS map
+    /// (seen.yaml), and a recording into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// How the run is recorded in the folder: run.mcap for Foxglove and Lichtblick (docs/foxglove.json is its layout), or
+    /// a ROS 2 bag.
+    #[arg(long, value_enum, default_value_t = RecordingFormat::Foxglove)]
+    pub recording_format: RecordingFormat,
     /// Draw what was seen and driven into this file, .png or .svg.
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
@@ -158,6 +171,32 @@ impl Args {
         Ok(file.map(|file| Trajectory::new(file, self.trajectory_format)))
     }
 
+    /// Begins what is left behind: a picture, a folder, both or nothing.
+    pub fn leave(&self, log: &Log, is_sampled: bool) -> Result<Leave> {
+        let mount = self.mount_of(log);
+        let scans = self.count(log.scans.len());
+        let drawn = (scans / DRAWN).max(1);
+        let start = log.scans.iter().find_map(|scan| scan.wheels);
+        let setup = Setup {
+            origin: TruePose::default(),
+            mount,
+            scans,
+            drawn,
+            has: (false, start.is_some()),
+            is_sampled,
+        };
+        let run = |folder: &PathBuf| Run::create(folder, self.recording_format.into(), &setup);
+        Ok(Leave {
+            track: self
+                .picture
+                .is_some()
+                .then(|| Track::new(TruePose::default(), mount.robot_from_lidar, drawn)),
+            run: self.out.as_ref().map(run).transpose()?,
+            elapsed: Elapsed::default(),
+            start,
+        })
+    }
+
     /// How many of a log's scans are replayed.
     pub fn count(&self, scans: usize) -> usize {
         self.scans.map_or(scans, |most| most.min(scans))
@@ -167,6 +206,61 @@ impl Args {
     pub fn name(&self) -> String {
         let name = self.log.file_name().unwrap_or_default();
         name.to_string_lossy().into_owned()
+    }
+}
+
+/// What a replay leaves behind.
+pub struct Leave {
+    track: Option<Track>,
+    run: Option<Run>,
+    elapsed: Elapsed,
+    /// The wheels' first pose.
+    start: Option<Pose>,
+}
+
+impl Leave {
+    /// Takes a scan in: where the robot is at its end, how well that is known, whether a match confirms it.
+    pub fn push(
+        &mut self,
+        scan: &Recorded,
+        estimate: Pose,
+        covariance: Option<Covariance>,
+        is_measured: bool,
+    ) -> Result<()> {
+        let wheels = self.start.zip(scan.wheels);
+        let at = At {
+            time: self.elapsed.at(&scan.beams),
+            estimate,
+            covariance,
+            is_measured,
+            truth: None,
+            wheels: wheels.map(|(start, now)| start.between(now)),
+        };
+        if let Some(track) = &mut self.track {
+            track.push(at, &scan.beams);
+        }
+        match &mut self.run {
+            Some(run) => run.push(scan, at),
+            None => Ok(()),
+        }
+    }
+
+    /// Draws and closes.
+    pub fn finish(
+        self,
+        args: &Args,
+        (title, caption): (String, String),
+        field: Option<LikelihoodField<&[u8]>>,
+    ) -> Result<()> {
+        if let (Some(track), Some(path)) = (self.track, &args.picture) {
+            picture::save(&track.map(title.clone(), caption.clone(), None), path)?;
+        }
+        if let (Some(run), Some(folder)) = (self.run, &args.out) {
+            let (files, mut remarks) = run.finish(Titles { title, caption }, None, field)?;
+            remarks.push(format!("{}: {}", folder.display(), files.join(" ")));
+            output::remark(&remarks);
+        }
+        Ok(())
     }
 }
 

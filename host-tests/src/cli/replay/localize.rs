@@ -6,17 +6,14 @@ use beamfix::localization::{Localizer, LocalizerConfig};
 use beamfix::matching::correlative::pyramid::Pyramid;
 use beamfix::pipeline::{Estimate as _, MapLocalizer, Verdict};
 use beamfix::scan::PointsConfig;
-use beamfix_sim::TruePose;
 use host_tests::formats::Log;
 use host_tests::formats::field::FieldFile;
 use host_tests::pipeline::follow;
 use host_tests::report::hash::PoseHash;
-use host_tests::report::picture;
-use host_tests::report::track::{At, Track};
 use host_tests::sized;
 use serde_json::json;
 
-use super::args::{Args, DRAWN};
+use super::args::Args;
 use super::{Done, add_context};
 use crate::cli::output;
 
@@ -86,11 +83,7 @@ fn in_map<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
     let mut trajectory = args.open_trajectory()?;
     let count = args.count(log.scans.len());
     let bar = output::progress(count, "localizing");
-    let mut track = Track::new(
-        TruePose::default(),
-        mount.robot_from_lidar,
-        (count / DRAWN).max(1),
-    );
+    let mut leave = args.leave(log, true)?;
     let (mut tracked, mut doubtful) = (0, 0);
     let ego = (count, args.uses_wheels());
     let followed = follow(log, ego, localizer, &mut |scan, pose, located| {
@@ -99,15 +92,9 @@ fn in_map<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
             Verdict::Predicted => doubtful += 1,
             Verdict::Unknown => {}
         }
-        if args.picture.is_some() && located.pose.is_some() {
-            let us = scan.beams.last().map_or(0, |beam| beam.time_us);
-            let at = At {
-                time: f64::from(us) * 1e-6,
-                estimate: pose,
-                truth: None,
-                wheels: None,
-            };
-            track.push(at, &scan.beams);
+        if located.pose.is_some() {
+            let is_measured = located.verdict() == Verdict::Measured;
+            leave.push(scan, pose, located.covariance, is_measured)?;
         }
         if let Some(file) = &mut trajectory {
             let is_guess = located.verdict() != Verdict::Measured;
@@ -120,11 +107,9 @@ fn in_map<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
     if let Some(file) = trajectory {
         file.finish()?;
     }
-    if let Some(path) = &args.picture {
-        let caption = format!("{count} scans, pose hash {}", followed.hash);
-        let title = format!("beamfix: {} localized", args.name());
-        picture::save(&track.map(title, caption, None), path)?;
-    }
+    let caption = format!("{count} scans, pose hash {}", followed.hash);
+    let title = format!("beamfix: {} localized", args.name());
+    leave.finish(args, (title, caption), Some(file.field()?))?;
     let counters = followed.estimator.localizer().counters();
     Ok(Outcome {
         scans: followed.scans,

@@ -4,15 +4,12 @@ use anyhow::Result;
 use beamfix::geometry::Pose;
 use beamfix::odometry::{Odometry, Refusal, Step};
 use beamfix::pipeline::Estimator;
-use beamfix_sim::TruePose;
 use host_tests::formats::Log;
 use host_tests::pipeline::{Followed, config, follow, sparse_odometry};
-use host_tests::report::picture;
-use host_tests::report::track::{At, Track};
 use host_tests::{size, sized};
 use serde_json::json;
 
-use super::args::{Args, DRAWN};
+use super::args::Args;
 use super::{Done, add_context};
 use crate::cli::output;
 
@@ -86,17 +83,12 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
     estimator: E,
     lost: impl Fn(&E) -> u32,
 ) -> Result<Followed<Counted>> {
-    let mount = args.mount_of(log);
     let mut trajectory = args.open_trajectory()?;
     let (mut measured, mut keyframes) = (0, 0);
     let count = args.count(log.scans.len());
     let bar = output::progress(count, "replaying");
-    let mut track = Track::new(
-        TruePose::default(),
-        mount.robot_from_lidar,
-        (count / DRAWN).max(1),
-    );
-    let start = log.scans.iter().find_map(|scan| scan.wheels);
+    let is_turning = size::beam_width(log.scans.iter().map(|scan| &scan.beams[..])).is_none();
+    let mut leave = args.leave(log, is_turning)?;
     let ego = (count, args.uses_wheels());
     let followed = follow(log, ego, estimator, &mut |scan, pose, step| {
         let is_first = step.keyframe && step.outcome == Err(Refusal::First);
@@ -106,31 +98,14 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
         if let Some(file) = &mut trajectory {
             file.push(&scan.stamp, pose, !is_measured)?;
         }
-        if args.picture.is_some() {
-            let us = scan.beams.last().map_or(0, |beam| beam.time_us);
-            let wheels = start
-                .zip(scan.wheels)
-                .map(|(start, now)| start.between(now));
-            let at = At {
-                time: f64::from(us) * 1e-6,
-                estimate: pose,
-                truth: None,
-                wheels,
-            };
-            track.push(at, &scan.beams);
-        }
+        leave.push(scan, pose, Some(step.covariance), is_measured)?;
         bar.inc(1);
         Ok(())
     })?;
     bar.finish_and_clear();
-    if let Some(path) = &args.picture {
-        let name = args.name();
-        let caption = format!("{count} scans, pose hash {}", followed.hash);
-        picture::save(
-            &track.map(format!("beamfix: odometry over {name}"), caption, None),
-            path,
-        )?;
-    }
+    let caption = format!("{count} scans, pose hash {}", followed.hash);
+    let title = format!("beamfix: odometry over {}", args.name());
+    leave.finish(args, (title, caption), None)?;
     if let Some(file) = trajectory {
         file.finish()?;
     }

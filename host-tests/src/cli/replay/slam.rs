@@ -39,8 +39,10 @@ pub fn run(args: &Args, log: &Log, directions: usize) -> Result<Done> {
     let map = mapping::run(log, &settings, &mut || bar.inc(1))?;
     bar.finish_and_clear();
     let mut hash = PoseHash::new();
-    for scan in &map.scans {
+    let mut leave = args.leave(log, true)?;
+    for (scan, recorded) in map.scans.iter().zip(&log.scans) {
         hash.push(scan.pose);
+        leave.push(recorded, scan.pose, None, scan.is_measured)?;
         if let Some(file) = &mut trajectory {
             file.push(&scan.stamp, scan.pose, !scan.is_measured)?;
         }
@@ -48,6 +50,12 @@ pub fn run(args: &Args, log: &Log, directions: usize) -> Result<Done> {
     if let Some(file) = trajectory {
         file.finish()?;
     }
+    let title = format!("beamfix: {} mapped", args.name());
+    let caption = format!(
+        "{count} scans, {} loops closed, pose hash {hash}",
+        map.counters.loops
+    );
+    leave.finish(args, (title, caption), None)?;
     if let Some((path, grid)) = args.map_out.as_deref().zip(map.grid.as_ref()) {
         ros_map::write(grid, path)?;
     }

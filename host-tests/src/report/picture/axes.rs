@@ -1,6 +1,7 @@
 //! What all pictures share: text, legends, axes in metres with one scale.
 
 use anyhow::{Result, anyhow};
+use beamfix::linalg::Covariance;
 use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
@@ -81,9 +82,8 @@ where
     // As many digits as two labels need to differ.
     let labels = (plot.0 as usize / 110, plot.1 as usize / 90);
     let step = (x.end - x.start) / labels.0.max(1) as f64;
-    let digits = libm::ceil(-libm::log10(step.max(1e-9))).max(1.0) as usize;
-    // A rounding error below zero would be written as -0.
-    let label = |value: &f64| format!("{:.digits$}", if value.abs() < 1e-9 { 0.0 } else { *value });
+    let digits = digits(step).max(1);
+    let label = |value: &f64| number(*value, digits);
     chart
         .configure_mesh()
         .x_desc("x (m)")
@@ -99,6 +99,41 @@ where
         .draw()
         .map_err(fail)?;
     Ok((chart, [x, y]))
+}
+
+/// How many decimals labels so far apart need to differ.
+#[must_use]
+pub fn digits(step: f64) -> usize {
+    libm::ceil(-libm::log10(step.max(1e-9))).max(0.0) as usize
+}
+
+/// A label; a rounding error below zero would be written as -0.
+#[must_use]
+pub fn number(value: f64, digits: usize) -> String {
+    let value = if value.abs() < 1e-9 { 0.0 } else { value };
+    format!("{value:.digits$}")
+}
+
+/// The closed line that holds 95 % of the positions, 2.45 standard deviations, so many times as large.
+#[must_use]
+pub fn ellipse(centre: [f64; 2], covariance: Covariance, scale: f64) -> Vec<[f64; 2]> {
+    let (xx, xy, yy) = (
+        f64::from(covariance.0.xx),
+        f64::from(covariance.0.xy),
+        f64::from(covariance.0.yy),
+    );
+    // Cholesky: the unit circle becomes the ellipse.
+    let a = libm::sqrt(xx.max(0.0));
+    let b = if a > 0.0 { xy / a } else { 0.0 };
+    let c = libm::sqrt((yy - b * b).max(0.0));
+    (0..=72)
+        .map(|k| {
+            let angle = core::f64::consts::TAU * f64::from(k) / 72.0;
+            let (u, v) = (libm::cos(angle), libm::sin(angle));
+            let [u, v] = [u, v].map(|side| 2.4477 * scale * side);
+            [centre[0] + a * u, centre[1] + b * u + c * v]
+        })
+        .collect()
 }
 
 /// Limits (m) that give both axes the same scale in `size` pixels.

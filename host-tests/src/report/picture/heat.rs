@@ -7,7 +7,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::Drawing;
-use super::axes::{fail, header, metres};
+use super::axes::{fail, header, line, metres};
 
 /// What to draw.
 pub struct Heat<'a> {
@@ -16,13 +16,18 @@ pub struct Heat<'a> {
     /// Line under the title.
     pub caption: String,
     /// The field, in its map's frame.
-    pub field: &'a LikelihoodField<Vec<u8>>,
+    pub field: LikelihoodField<&'a [u8]>,
+    /// Where a robot drove in it (m); may be empty.
+    pub path: Vec<[f64; 2]>,
 }
 
 const WIDTH: u32 = 1500;
 const HEADER: u32 = 116;
 /// Where nothing is explored.
 const UNEXPLORED: RGBColor = RGBColor(90, 100, 120);
+
+/// Seen on black, red and white.
+const PATH: RGBColor = RGBColor(0, 170, 230);
 
 /// From black over red to white as a beam likes to end there.
 fn glow(byte: u8) -> RGBColor {
@@ -59,16 +64,21 @@ impl Drawing for Heat<'_> {
         B::ErrorType: 'static,
     {
         let (top, body) = area.split_vertically(HEADER);
-        let unexplored = stored::header(&self.field.as_slice())[5];
-        let legend = [
-            ("beams end here", glow(250), 12),
+        let unexplored = stored::header(&self.field)[5];
+        let path = (!self.path.is_empty()).then_some(("estimated path", PATH, 4));
+        let legend: Vec<_> = [
+            ("beams end here", glow(190), 12),
             ("near a surface", glow(120), 12),
             ("nothing near", glow(0), 12),
             ("unexplored", UNEXPLORED, 12),
-        ];
+        ]
+        .into_iter()
+        .chain(path)
+        .collect();
         header(&top, 70, &self.title, &self.caption, &legend)?;
         let (low, high) = self.limits();
-        let (chart, [x_axis, y_axis]) = metres(&body, low, high, "")?;
+        let (mut chart, limits) = metres(&body, low, high, "")?;
+        let [x_axis, y_axis] = &limits;
         let plot = chart.plotting_area();
         let (width, height) = plot.dim_in_pixel();
         let shape = self.field.grid().shape();
@@ -77,7 +87,7 @@ impl Drawing for Heat<'_> {
                 let along = |axis: &std::ops::Range<f64>, k: u32, of: u32| {
                     axis.start + (axis.end - axis.start) * (f64::from(k) + 0.5) / f64::from(of)
                 };
-                let (x, y) = (along(&x_axis, column, width), along(&y_axis, row, height));
+                let (x, y) = (along(x_axis, column, width), along(y_axis, row, height));
                 let (cell_x, cell_y) = shape.cell_of(Point::new(x as f32, y as f32));
                 let Some(byte) = self.field.grid().get(cell_x, cell_y) else {
                     continue;
@@ -90,6 +100,6 @@ impl Drawing for Heat<'_> {
                 plot.draw_pixel((x, y), &colour).map_err(fail)?;
             }
         }
-        Ok(())
+        line(&mut chart, &limits, &self.path, PATH.stroke_width(3))
     }
 }

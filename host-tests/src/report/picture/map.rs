@@ -34,6 +34,17 @@ pub struct Map {
     pub points: Vec<[f64; 2]>,
     /// Paths, the first one lowest.
     pub paths: Vec<Path>,
+    /// How well the estimate is known along its path.
+    pub ellipses: Option<Ellipses>,
+}
+
+/// Ellipses of one kind.
+#[derive(Debug, Clone)]
+pub struct Ellipses {
+    /// What they are.
+    pub name: String,
+    /// Closed lines (m).
+    pub shapes: Vec<Vec<[f64; 2]>>,
 }
 
 const WIDTH: u32 = 1500;
@@ -87,7 +98,11 @@ impl Drawing for Map {
             .paths
             .iter()
             .map(|path| (path.name.as_str(), path.colour, path.width));
-        let legend: Vec<_> = walls.chain(points).chain(paths).collect();
+        let ellipses = self
+            .ellipses
+            .iter()
+            .map(|all| (all.name.as_str(), colour::PURPLE, 2));
+        let legend: Vec<_> = walls.chain(points).chain(paths).chain(ellipses).collect();
         header(&top, 70, &self.title, &self.caption, &legend)?;
 
         let (low, high) = self.limits();
@@ -130,6 +145,9 @@ impl Drawing for Map {
                 &path.places,
                 path.colour.stroke_width(path.width),
             )?;
+        }
+        for shape in self.ellipses.iter().flat_map(|all| &all.shapes) {
+            line(&mut chart, &limits, shape, colour::PURPLE.stroke_width(2))?;
         }
         Ok(())
     }

@@ -8,9 +8,9 @@ use beamfix::scan::{Points, ScanPoint};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::axes::{bounds, dots, header, line, metres};
+use super::axes::{bounds, dots, ellipse, header, line, metres};
 use super::{Drawing, colour};
-use crate::report::score::quantile;
+use crate::report::score::{error, quantile};
 use beamfix_sim::TruePose;
 
 /// A current point in the reference's frame, with the place on the reference's line that it is drawn to.
@@ -33,6 +33,15 @@ pub struct PairPicture {
     truth: Pose,
     found: Option<(Pose, Covariance)>,
     path: Vec<Pose>,
+    /// The current points by each pose of the path.
+    passes: Vec<Vec<Placed>>,
+    truth_name: String,
+}
+
+/// A moment of a match: the current scan where a pass has put it.
+pub struct Frame<'a> {
+    pair: &'a PairPicture,
+    pass: usize,
 }
 
 /// Gate of the matcher's first pass (mm): a point farther from its line has no say.
@@ -40,6 +49,12 @@ const FIRST_GATE: f64 = 1024.0;
 /// Gate of its last pass (mm).
 const LAST_GATE: f64 = 128.0;
 
+/// Gate of a pass (mm), for its picture: halved from pass to pass.
+fn gate_of(pass: usize) -> f64 {
+    (FIRST_GATE / f64::from(1u32 << pass.min(16))).max(LAST_GATE)
+}
+
+const FRAME: (u32, u32) = (720, 760);
 const SIZE: (u32, u32) = (1800, 1640);
 const HEADER: u32 = 120;
 const SCANS: u32 = 800;
@@ -66,21 +81,45 @@ impl PairPicture {
                 .map(|point| placed(lines, pose, point, gate))
                 .collect()
         };
+        let at_guess: Vec<Placed> = place(guess, FIRST_GATE);
+        let passes = path
+            .iter()
+            .enumerate()
+            .map(|(pass, pose)| place(*pose, gate_of(pass + 1)));
+        let passes = [at_guess.clone()].into_iter().chain(passes).collect();
         Self {
             title,
             caption,
+            passes,
+            truth_name: "truth".into(),
             reference: reference
                 .as_slice()
                 .iter()
                 .map(|p| metres_of(p.x, p.y))
                 .collect(),
-            before: place(guess, FIRST_GATE),
+            before: at_guess,
             after: place(end, LAST_GATE),
             guess,
             truth,
             found,
             path,
         }
+    }
+
+    /// The same, where what is drawn as the truth is something else.
+    #[must_use]
+    pub fn with_truth_named(self, name: &str) -> Self {
+        Self {
+            truth_name: name.into(),
+            ..self
+        }
+    }
+
+    /// The guess and the estimate after each pass, one picture each, for an animation.
+    #[must_use]
+    pub fn frames(&self) -> Vec<Frame<'_>> {
+        let frame = |pass| Frame { pair: self, pass };
+        (0..self.passes.len()).map(frame).collect()
     }
 
     fn scans<B: DrawingBackend>(
@@ -157,7 +196,7 @@ impl PairPicture {
         let xy = |pose: Pose| [f64::from(pose.x), f64::from(pose.y)];
         let ellipse = self
             .found
-            .map(|(pose, covariance)| ellipse(xy(pose), covariance));
+            .map(|(pose, covariance)| ellipse(xy(pose), covariance, 1.0));
         let path: Vec<[f64; 2]> = [self.guess]
             .into_iter()
             .chain(self.path.iter().copied())
@@ -244,7 +283,7 @@ impl Drawing for PairPicture {
             ("guess", colour::ORANGE, 6),
             ("passes", colour::INK, 3),
             ("found, with 95 % ellipse", colour::RED, 3),
-            ("truth", colour::GREEN, 6),
+            (self.truth_name.as_str(), colour::GREEN, 6),
         ];
         header(&top, 30, &self.title, &self.caption, &legend)?;
         let (scans, ways) = body.split_vertically(SCANS);
@@ -263,6 +302,37 @@ impl Drawing for PairPicture {
             false,
         )?;
         self.way(&right, "the same, around the end", true)
+    }
+}
+
+impl Drawing for Frame<'_> {
+    fn size(&self) -> (u32, u32) {
+        FRAME
+    }
+
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()>
+    where
+        B::ErrorType: 'static,
+    {
+        let (top, body) = area.split_vertically(HEADER);
+        let Self { pair, pass } = *self;
+        let legend = [
+            ("reference", colour::BLUE, 6),
+            ("current", colour::RED, 5),
+            ("rejected", colour::PURPLE, 5),
+            ("correspondence", colour::GREEN, 2),
+        ];
+        let pose = pass.checked_sub(1).and_then(|k| pair.path.get(k));
+        let (metres, degrees) = error(*pose.unwrap_or(&pair.guess), pair.truth);
+        let caption = format!(
+            "pass {pass} of {}: {:.1} mm and {degrees:.3}° from {}",
+            pair.path.len(),
+            1e3 * metres,
+            pair.truth_name
+        );
+        header(&top, 30, "a match, pass by pass", &caption, &legend)?;
+        let points = pair.passes.get(pass).map_or(&[][..], |points| points);
+        pair.scans(&body, "", points)
     }
 }
 
@@ -299,24 +369,4 @@ fn placed<const N: usize>(
 
 fn metres_of(x: i16, y: i16) -> [f64; 2] {
     [f64::from(x) * 1e-3, f64::from(y) * 1e-3]
-}
-
-/// The line that holds 95 % of the positions: 2.45 standard deviations.
-fn ellipse(centre: [f64; 2], covariance: Covariance) -> Vec<[f64; 2]> {
-    let (xx, xy, yy) = (
-        f64::from(covariance.0.xx),
-        f64::from(covariance.0.xy),
-        f64::from(covariance.0.yy),
-    );
-    // Cholesky: the unit circle becomes the ellipse.
-    let a = libm::sqrt(xx.max(0.0));
-    let b = if a > 0.0 { xy / a } else { 0.0 };
-    let c = libm::sqrt((yy - b * b).max(0.0));
-    (0..=72)
-        .map(|k| {
-            let angle = core::f64::consts::TAU * f64::from(k) / 72.0;
-            let (u, v) = (2.4477 * libm::cos(angle), 2.4477 * libm::sin(angle));
-            [centre[0] + a * u, centre[1] + b * u + c * v]
-        })
-        .collect()
 }
