@@ -17,6 +17,7 @@ mod simulate;
 mod tune;
 mod verify;
 mod watch;
+mod worlds;
 
 use std::process::ExitCode;
 
@@ -49,6 +50,7 @@ enum Command {
     Card(card::Args),
     Prune(prune::Args),
     Scenes(scenes::Args),
+    Worlds(worlds::Args),
     Tune(tune::Args),
     Verify(verify::Args),
     Watch(watch::Args),
@@ -72,6 +74,7 @@ pub fn run() -> ExitCode {
         Some(Command::Card(args)) => card::run(&args),
         Some(Command::Prune(args)) => prune::run(&args),
         Some(Command::Scenes(args)) => scenes::run(&args),
+        Some(Command::Worlds(args)) => worlds::run(&args),
         Some(Command::Tune(args)) => tune::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
         Some(Command::Watch(args)) => watch::run(&args),

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, anyhow, bail};
 use beamfix::geometry::Pose;
 use beamfix::grid::occupancy;
+use beamfix::lidar::Model;
 use beamfix::odometry::{Odometry, Refusal, Step};
 use beamfix::pipeline::Estimator;
 use beamfix::scan::Mount;
@@ -86,37 +87,51 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let model = decode::model(&args.lidar, &[])?;
     fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     let settings = Settings {
+        ranging: self::settings(model).ranging,
+        ..settings
+    };
+    let driven = drive(place(args)?, &settings, model)?;
+    let path = args.out.join(RECORDING);
+    fs::write(&path, &driven.bytes).with_context(|| path.display().to_string())?;
+    let size = driven.size();
+    sized!(size, turning(args, &settings, driven))
+}
+
+/// The default drive with a lidar that ranges as `model` does.
+pub fn settings(model: &Model) -> Settings {
+    Settings {
         ranging: Ranging {
             nearest: f64::from(model.min_range_mm) * 1e-3,
             farthest: f64::from(model.max_range_mm) * 1e-3,
             ..Ranging::DEFAULT
         },
-        ..settings
-    };
-    let drive = beamfix_sim::drive_in(place(args)?, &settings, encoder::for_model(model).as_mut());
+        ..Settings::DEFAULT
+    }
+}
+
+/// Drives through a place with a lidar of `model`.
+pub fn drive(place: Place, settings: &Settings, model: &'static Model) -> Result<Driven> {
+    let drive = beamfix_sim::drive_in(place, settings, encoder::for_model(model).as_mut());
     let (bytes, revolutions, summary) = simulated::capture(&drive, settings.mount, model)?;
-    let path = args.out.join(RECORDING);
-    fs::write(&path, &bytes).with_context(|| path.display().to_string())?;
     let moment = |revolution| simulated::moment(&drive, revolution);
     let moments: Option<Vec<Moment>> = revolutions.iter().map(moment).collect();
     let moments = moments.context("a revolution ends at a beam")?;
-    let size = size::fitting(revolutions.iter().map(|revolution| &revolution.beams[..]));
     let log = if moments.is_empty() {
         Log::default()
     } else {
-        log::parse(
-            "the simulated drive",
-            Content { bytes, cut: None },
-            model.name,
-        )?
+        let content = Content {
+            bytes: bytes.clone(),
+            cut: None,
+        };
+        log::parse("the simulated drive", content, model.name)?
     };
-    let driven = Driven {
+    Ok(Driven {
         drive,
         moments,
         log,
+        bytes,
         packets: summary.packets,
-    };
-    sized!(size, turning(args, &settings, driven))
+    })
 }
 
 /// Where the robot drives: a place that is built in, or described in a file.
@@ -165,12 +180,21 @@ const RECORDING: &str = "lidar.rec";
 const RING_RECORDING: &str = "ring.log";
 
 /// A finished drive, and its scans as the pipeline gets them.
-struct Driven {
-    drive: Drive,
-    log: Log,
+pub struct Driven {
+    pub drive: Drive,
+    pub log: Log,
     /// The robot at the end of each scan.
-    moments: Vec<Moment>,
+    pub moments: Vec<Moment>,
+    /// The capture that the log was read from; none of a ring of rangers.
+    bytes: Vec<u8>,
     packets: u32,
+}
+
+impl Driven {
+    /// Room for this many beams a revolution is enough.
+    pub fn size(&self) -> usize {
+        size::fitting(self.log.scans.iter().map(|scan| &scan.beams[..]))
+    }
 }
 
 /// A lidar that turns, with room for N beams a revolution.
@@ -203,6 +227,7 @@ fn ring(args: &Args, settings: Settings) -> Result<ExitCode> {
         drive,
         log,
         moments,
+        bytes: Vec::new(),
         packets: 0,
     };
     replay(args, &settings, driven, odometry, |_| 0)
@@ -239,6 +264,7 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
         drive,
         log,
         moments,
+        bytes,
         packets,
     } = driven;
     let Some(&origin) = moments.first() else {
@@ -264,7 +290,7 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
     let mut run = Run::create(&args.out, args.recording_format.into(), &setup)?;
     let recording = if log.capture.is_some() {
         // So that `replay` takes this file too.
-        run.attach(ATTACHMENT, &fs::read(args.out.join(RECORDING))?)?;
+        run.attach(ATTACHMENT, &bytes)?;
         RECORDING
     } else {
         RING_RECORDING

@@ -42,8 +42,8 @@ pub struct Setup {
 }
 
 enum Recording {
-    Foxglove(McapFile),
-    Ros2(RosBag),
+    Foxglove(Box<McapFile>),
+    Ros2(Box<RosBag>),
 }
 
 /// A run being written.
@@ -72,9 +72,12 @@ impl Run {
         poses.extend(setup.has.1.then_some("wheels"));
         let recording = match format {
             Format::Foxglove => {
-                Recording::Foxglove(McapFile::create(&folder.join("run.mcap"), &poses)?)
+                let file = McapFile::create(&folder.join("run.mcap"), &poses)?;
+                Recording::Foxglove(Box::new(file))
             }
-            Format::Ros2 => Recording::Ros2(RosBag::create(&folder.join("bag"), setup.mount)?),
+            Format::Ros2 => {
+                Recording::Ros2(Box::new(RosBag::create(&folder.join("bag"), setup.mount)?))
+            }
         };
         Ok(Self {
             folder: folder.to_owned(),

@@ -67,7 +67,7 @@ impl Outcome {
     }
 
     /// Takes a step in: where the robot really is, in the frame in which it started.
-    fn push(&mut self, time: f64, step: &Step, truth: TruePose) {
+    pub fn push(&mut self, time: f64, step: &Step, truth: TruePose) {
         let [x, y, turned] = [
             f64::from(step.pose.x) - truth.x,
             f64::from(step.pose.y) - truth.y,

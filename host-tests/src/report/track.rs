@@ -215,7 +215,7 @@ impl Track {
                 (100.0 * metres, degrees)
             });
             let stated = at.covariance.map(|covariance| {
-                let heading = libm::sqrt(f64::from(covariance.0.tt.max(0.0)));
+                let heading = libm::sqrt(f64::from(covariance.0.tt).max(0.0));
                 (100.0 * sigma(covariance), heading.to_degrees())
             });
             Row {

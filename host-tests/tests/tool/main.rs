@@ -4,6 +4,7 @@ mod cli;
 #[path = "../common/mod.rs"]
 mod common;
 mod fields;
+mod leave;
 mod recordings;
 mod regress;
 mod scenes;

@@ -52,3 +52,29 @@ fn a_place_that_is_not_there_is_refused_with_those_that_are() {
         assert!(said.contains(words), "{said}");
     }
 }
+
+#[test]
+fn nothing_is_wrong_and_confident_in_a_built_in_place() {
+    // The whole table takes half a minute: `beamfix worlds`.
+    let worlds = [
+        "worlds", "--world", "flat", "--world", "hall", "--world", "maze", "--json",
+    ];
+    let table = json(&beamfix(&[&worlds[..], &["--seeds", "1"]].concat()));
+    let rows = table["worlds"].as_array().expect("a list");
+    assert_eq!(rows.len(), 3, "{table}");
+    assert_eq!(table["wrong_and_confident"], 0, "{table}");
+    for row in rows {
+        assert!(
+            row["scans"].as_u64().is_some_and(|scans| scans > 500),
+            "{row}"
+        );
+    }
+    // What `simulate` prints of the same drive.
+    let out = folder("worlds-table");
+    let run = json(&beamfix(&["--out", text(&out), "--json"]));
+    for key in ["final_error_m", "max_error_m", "refused", "scans"] {
+        let [found, told] = [&rows[0][key], &run[key]].map(|v| v.as_f64().expect(key));
+        // One is computed in single precision.
+        assert!((found - told).abs() < 1e-6, "{key}: {found}, {told}");
+    }
+}

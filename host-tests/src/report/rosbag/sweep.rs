@@ -1,41 +1,60 @@
 //! Bearings in equal steps, as a `LaserScan` states them.
 
-use beamfix::scan::Beam;
+use beamfix::scan::{Beam, Bearing};
 
 /// In bearings of 1/65536 turn.
 const UNITS: f64 = 65_536.0;
 
-/// The line through the bearings of scans: first bearing and step (1/65536 turn), one that holds for many scans.
+/// First bearing and step (rad), kept as long as they serve.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sweep {
-    line: (f64, f64),
-    /// Largest distance of a bearing from the line so far (1/65536 turn).
+    line: (f32, f32),
+    /// Largest distance of a bearing from its place so far (1/65536 turn); 0 where each was as it is read.
     largest: f64,
 }
 
 impl Sweep {
-    /// First bearing and step (rad) for the beams of a scan: such that each rounds to its own bearing, where there are.
+    /// First bearing and step (rad) for the beams of a scan: such that each is read as it was, where there are such.
     pub fn fit(&mut self, beams: &[Beam]) -> (f32, f32) {
-        let bearings = unwrapped(beams);
-        let shift = spread(&bearings, self.line.1).shift_from(self.line.0);
-        // The last scan's line: the same array means the same directions.
-        if shift >= 0.5 || bearings.is_empty() {
-            self.line = best(&bearings);
+        if gives(self.line, beams) {
+            return self.line;
         }
-        let shift = spread(&bearings, self.line.1).shift_from(self.line.0);
-        self.largest = self.largest.max(shift);
-        let radians = |units: f64| (units / UNITS * core::f64::consts::TAU) as f32;
-        (radians(self.line.0), radians(self.line.1))
+        let bearings = unwrapped(beams);
+        let (first, step) = best(&bearings);
+        let shift = spread(&bearings, step).shift_from(first);
+        let last = beams.len().saturating_sub(1).max(1) as f64;
+        // Where rounding alone is between: lines beside the best one, as single precision has them.
+        let sides = -10..=10i32;
+        let beside = sides
+            .clone()
+            .flat_map(|a| sides.clone().map(move |b| (f64::from(a), f64::from(b))))
+            .map(|(a, b)| (radians(first + 0.002 * a), radians(step + 0.002 * b / last)));
+        let mut beside = beside.take(if shift < 0.51 { usize::MAX } else { 0 });
+        match beside.find(|line| gives(*line, beams)) {
+            Some(line) => self.line = line,
+            None => {
+                self.line = (radians(first), radians(step));
+                self.largest = self.largest.max(shift);
+            }
+        }
+        self.line
     }
 
-    /// Largest distance of a bearing from its place (rad); none where every bearing is as it was, after rounding.
+    /// Largest distance of a bearing from its place so far (rad).
     pub fn largest_shift(&self) -> f64 {
-        if self.largest < 0.5 {
-            0.0
-        } else {
-            self.largest / UNITS * core::f64::consts::TAU
-        }
+        self.largest / UNITS * core::f64::consts::TAU
     }
+}
+
+fn radians(units: f64) -> f32 {
+    (units / UNITS * core::f64::consts::TAU) as f32
+}
+
+/// Whether the bearings of a line, read as a `LaserScan`'s are, are those of the beams.
+fn gives((first, step): (f32, f32), beams: &[Beam]) -> bool {
+    let bearing = |k: usize| f64::from(first) + f64::from(step) * k as f64;
+    let mut beams = beams.iter().enumerate();
+    beams.all(|(k, beam)| Bearing::from_radians(bearing(k) as f32) == beam.bearing)
 }
 
 /// Bearings that grow or fall steadily (1/65536 turn): a step is at most half a turn.

@@ -1,0 +1,94 @@
+//! What a run leaves in its folder: pictures, an animation, a map, a recording.
+
+use std::fs::{self, File};
+use std::path::Path;
+
+use host_tests::formats::ros_map;
+
+use crate::common::tool::{beamfix, folder, json, text};
+
+/// Frames of an animation; panics where one is not whole.
+fn frames(path: &Path) -> usize {
+    let file = File::open(path).expect("an animation");
+    let mut decoder = gif::Decoder::new(file).expect("a GIF");
+    let mut count = 0;
+    while let Some(frame) = decoder.read_next_frame().expect("whole frames") {
+        assert_eq!((frame.width, frame.height), (720, 760));
+        count += 1;
+    }
+    count
+}
+
+#[test]
+fn every_mode_leaves_pictures_that_are_whole() {
+    let folder = folder("leave");
+    let (drive, map) = (folder.join("drive"), folder.join("flat.yaml"));
+    let simulated = [
+        "--seconds",
+        "12",
+        "--out",
+        text(&drive),
+        "--ros-map",
+        text(&map),
+        "--json",
+    ];
+    json(&beamfix(&simulated));
+    let recording = drive.join("lidar.rec");
+    let localize = ["--mode", "localize", "--map", text(&map)];
+    for (mode, extra, has_field) in [
+        ("odometry", &[][..], false),
+        ("slam", &["--mode", "slam"][..], false),
+        ("localize", &localize[..], true),
+    ] {
+        let out = folder.join(mode);
+        let mut arguments = vec!["replay", text(&recording), "--out", text(&out), "--json"];
+        arguments.extend(extra);
+        let _ = fs::remove_dir_all(&out);
+        json(&beamfix(&arguments));
+        for picture in ["map.png", "match.png"] {
+            let picture = image::open(out.join(picture)).expect(mode);
+            assert!(picture.width() >= 1500 && picture.height() > 600, "{mode}");
+        }
+        assert_eq!(out.join("field.png").exists(), has_field, "{mode}");
+        // The guess, and at least a pass.
+        assert!(frames(&out.join("match.gif")) >= 2, "{mode}");
+        let seen = ros_map::read(&out.join("seen.yaml")).expect(mode);
+        let walls = seen.cells().iter().filter(|byte| **byte > 128).count();
+        assert!(walls > 200, "{mode}: {walls} cells of walls");
+        assert!(out.join("run.mcap").exists(), "{mode}");
+        // A graph states no covariance.
+        let chart = fs::read_to_string(out.join("errors.svg")).ok();
+        assert_eq!(chart.is_some(), mode != "slam", "{mode}");
+        assert!(chart.is_none_or(|chart| chart.contains("standard deviations")));
+    }
+}
+
+#[test]
+fn a_ros_bag_of_a_ros_bag_gives_its_poses() {
+    // That rosbags reads it: host-tests/python/tests/test_recordings.py.
+    let folder = folder("leave-bag");
+    let as_bag = ["--recording-format", "ros2", "--json", "--out"];
+    let simulated = ["--seconds", "10"];
+    json(&beamfix(
+        &[&simulated[..], &as_bag, &[text(&folder)]].concat(),
+    ));
+    let (bag, out) = (folder.join("bag"), folder.join("replay"));
+    let replay = ["replay", text(&bag)];
+    let first = json(&beamfix(&[&replay[..], &as_bag, &[text(&out)]].concat()));
+    let bag = out.join("bag");
+    let again = json(&beamfix(&["replay", text(&bag), "--json"]));
+    assert_eq!(again, first);
+}
+
+#[test]
+fn what_is_replayed_is_not_written_over() {
+    let folder = folder("leave-over");
+    let arguments = ["--seconds", "2", "--out", text(&folder)];
+    assert!(beamfix(&arguments).status.success());
+    let recording = folder.join("run.mcap");
+    let before = fs::read(&recording).expect("a recording");
+    let run = beamfix(&["replay", text(&recording), "--out", text(&folder)]);
+    assert_eq!(run.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&run.stderr).contains("overwritten"));
+    assert_eq!(fs::read(&recording).expect("a recording"), before);
+}
