@@ -83,10 +83,7 @@ impl RosBag {
         let name = || folder.display().to_string();
         std::fs::create_dir_all(folder).with_context(name)?;
         let file = File::create(folder.join(FILE)).with_context(name)?;
-        let options = mcap::WriteOptions::new()
-            .compression(None)
-            .profile("ros2")
-            .library("beamfix");
+        let options = mcap::WriteOptions::new().compression(None).profile("ros2");
         Ok(Self {
             writer: options.create(BufWriter::new(file)).with_context(name)?,
             folder: folder.to_owned(),
