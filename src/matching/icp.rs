@@ -25,9 +25,9 @@ pub(crate) mod projective;
 #[cfg(feature = "internals")]
 pub mod projective;
 
+pub(crate) use projective::{Guess, Rivals, align_from, remove_companions};
 pub use projective::{IcpConfig, Reference, Search, align};
 #[cfg(not(feature = "internals"))]
 pub(crate) use projective::{Line, align_observed, smooth_towards};
 #[cfg(feature = "internals")]
 pub use projective::{Line, align_observed, smooth_towards};
-pub(crate) use projective::{align_near, remove_companions};

@@ -10,7 +10,10 @@ use super::{
 use crate::{
     geometry::{Pose, Twist},
     linalg::Covariance,
-    matching::{Match, MatchError, icp},
+    matching::{
+        Match, MatchError,
+        icp::{self, Guess, Rivals},
+    },
     math,
     scan::Scan,
 };
@@ -41,8 +44,15 @@ impl<const N: usize> Odometry<N> {
     /// Matches the scan, deskewed with `twist`, at another pose, and takes that match if it explains the scan better.
     #[inline]
     fn improve(&self, best: &mut Attempt, twist: Twist, predicted: Pose, prior: &Prior) {
-        let outcome = self.try_match(predicted, prior);
-        if score(&outcome) > score(best.outcome) {
+        // Others compete with a guess that alone explains more than what is known.
+        for rivals in [Rivals::None(score(best.outcome)), self.rivals()] {
+            let outcome = self.try_match(predicted, prior, rivals);
+            if score(&outcome) <= score(best.outcome) {
+                return;
+            }
+            if matches!(rivals, Rivals::None(_)) {
+                continue;
+            }
             *best.outcome = outcome;
             best.twist = twist;
         }
@@ -126,7 +136,7 @@ impl<const N: usize> Odometry<N> {
         ) {
             self.deskewed.assign(scan, during, &self.config.points);
             self.deskewed.pose = middle * during.displacement(-back);
-            if let Ok(again) = self.try_match(self.deskewed.pose, prior) {
+            if let Ok(again) = self.try_match(self.deskewed.pose, prior, self.rivals()) {
                 *found = again;
                 (self.deskewed.pose, _) = self.robot_pose(found);
                 middle = self.deskewed.pose * during.displacement(back);
@@ -167,8 +177,9 @@ impl<const N: usize> Odometry<N> {
     pub(super) fn refuse_ambiguous(&self, prior: &Prior, best: &mut Attempt) {
         /// A heading known better than this (rad) decides between two sides of a hexagon.
         const SURE: f32 = 0.3;
-        /// Headings that are tried, and how far apart two of them are (rad).
-        const SIDES: u8 = 8;
+        /// Headings that are tried, and how far apart two of them are (rad). Twelve are 30° apart: a room of three, four or
+        /// six equal sides has its others there.
+        const SIDES: u8 = 12;
         const APART: f32 = 0.3;
         /// A match elsewhere that explains this share of what the best does is as good.
         const AS_GOOD: f32 = 0.95;
@@ -197,8 +208,14 @@ impl<const N: usize> Odometry<N> {
         for side in 1..SIDES {
             let rotation = f32::from(side) * core::f32::consts::TAU / f32::from(SIDES);
             let turned = middle * Pose::new(0.0, 0.0, rotation) * middle.inverse();
-            let guess = first * turned;
-            let other = icp::align_near(reference, points, (guess, false), &self.config.icp);
+            // What explains less than this can be no rival.
+            let least = FAR_BETTER * best.outcome.as_ref().map_or(0.0, |found| found.score);
+            let guess = Guess {
+                pose: first * turned,
+                is_decided: false,
+                rivals: Rivals::None(least),
+            };
+            let other = icp::align_from(reference, points, guess, &self.config.icp);
             if let (Ok(other), Ok(found)) = (other, &mut *best.outcome)
                 && math::abs(math::wrap_angle(other.pose.theta - found.pose.theta)) > APART
                 && self.is_credible_heading(&other, prior, MAX_SIGMAS * sigma)
@@ -232,7 +249,12 @@ impl<const N: usize> Odometry<N> {
 
     /// Matches the points against the keyframe, starting from where the robot should be.
     #[inline(never)]
-    pub(super) fn try_match(&self, predicted: Pose, prior: &Prior) -> Result<Match, Refusal> {
+    pub(super) fn try_match(
+        &self,
+        predicted: Pose,
+        prior: &Prior,
+        rivals: Rivals,
+    ) -> Result<Match, Refusal> {
         let needed = self.config.icp.min_inliers.saturating_mul(2);
         let points = self.deskewed.points.as_slice();
         if self.counters.keyframes == 0 {
@@ -244,11 +266,27 @@ impl<const N: usize> Odometry<N> {
             });
         }
         let motion = self.keyframe.pose.between(predicted);
-        let guess = self.config.points.mount.lidar_motion(motion);
+        let guess = Guess {
+            pose: self.config.points.mount.lidar_motion(motion),
+            is_decided: self.is_decided(prior),
+            rivals,
+        };
         let (reference, config) = (&self.keyframe.reference, &self.config.icp);
-        match icp::align_near(reference, points, (guess, self.is_decided(prior)), config) {
-            Ok(found) => self.near_enough(found, guess),
+        match icp::align_from(reference, points, guess, config) {
+            Ok(found) => self.near_enough(found, guess.pose),
             Err(error) => Err(Refusal::NoMatch(error)),
+        }
+    }
+
+    /// The starts that may compete with a prediction: as far from it as the heading may be.
+    pub(super) fn rivals(&self) -> Rivals {
+        /// So many standard deviations of the heading are within the starts near by (20°).
+        const MAX_SIGMAS: f32 = 4.0;
+        const NEAR: f32 = 0.35;
+        if MAX_SIGMAS * math::sqrt(self.tracking.relative.0.tt) < NEAR {
+            Rivals::Near
+        } else {
+            Rivals::All
         }
     }
 

@@ -40,6 +40,7 @@ pub(crate) use companions::remove_companions;
 pub use config::{IcpConfig, Search};
 pub use line::Line;
 pub use reference::Reference;
+pub(crate) use task::{Guess, Rivals};
 
 use crate::{
     geometry::Pose,
@@ -100,27 +101,32 @@ pub fn align_observed<const N: usize>(
     config: &IcpConfig,
     observe: impl FnMut(Pose),
 ) -> Result<Match, MatchError> {
-    search(reference, points, (guess, false), config, observe)
+    let guess = Guess {
+        pose: guess,
+        is_decided: false,
+        rivals: Rivals::All,
+    };
+    search(reference, points, guess, config, observe)
 }
 
-/// As [`align`]; where `is_decided`, the guess is known to decide between places near by that explain the scan equally well.
+/// As [`align`], from a guess of which more is known.
 ///
 /// # Errors
 /// As [`align`].
-pub(crate) fn align_near<const N: usize>(
+pub(crate) fn align_from<const N: usize>(
     reference: &Reference<N>,
     points: &[ScanPoint],
-    guess: (Pose, bool),
+    guess: Guess,
     config: &IcpConfig,
 ) -> Result<Match, MatchError> {
     search(reference, points, guess, config, |_| ())
 }
 
-/// The pose of `points`, and whether the guess decides between places near by.
+/// The pose of `points`.
 fn search<const N: usize>(
     reference: &Reference<N>,
     points: &[ScanPoint],
-    (guess, is_decided): (Pose, bool),
+    guess: Guess,
     config: &IcpConfig,
     mut observe: impl FnMut(Pose),
 ) -> Result<Match, MatchError> {
@@ -133,18 +139,19 @@ fn search<const N: usize>(
         let found = reference.len();
         return Err(MatchError::TooFewLines { found, needed });
     }
-    let start = FixedPose::new(guess).ok_or(MatchError::BadGuess)?;
+    let start = FixedPose::new(guess.pose).ok_or(MatchError::BadGuess)?;
     let task = Task {
         lines: reference.lines(),
         points,
         start,
         lever_shift: accumulate::lever_shift(points, start),
         sigma: u32::from(reference.sigma()),
-        is_decided,
+        is_decided: guess.is_decided,
+        rivals: guess.rivals,
         config,
     };
     let best = multistart::search(&task, &mut observe)?;
-    verdict::verdict(&task, &best, guess)
+    verdict::verdict(&task, &best, guess.pose)
 }
 
 /// Moves `points`, seen at `pose` in the reference's frame, towards the surfaces that the reference saw there, if they are

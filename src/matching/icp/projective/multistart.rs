@@ -6,10 +6,10 @@ use crate::{
         MatchError,
         icp::projective::{
             config::Search,
-            descent::{Candidate, Refined},
+            descent::{Candidate, Reached, Refined},
             fixed_pose::FixedPose,
             normal_equations::Sums,
-            task::Task,
+            task::{Rivals, Task},
         },
     },
     math,
@@ -190,17 +190,34 @@ fn is_sharp(task: &Task<'_>, found: &Refined) -> bool {
 pub(super) fn search(task: &Task<'_>, observe: &mut impl FnMut(Pose)) -> Result<Best, MatchError> {
     let first = task
         .coarse(task.start, |_| false, observe)
-        .and_then(|found| task.fine(found.ok_or(MatchError::Degenerate)?, observe));
+        .and_then(|found| {
+            let reached = found.ok_or(MatchError::Degenerate)?;
+            if let Rivals::None(least) = task.rivals {
+                may_be_worth(task, reached, least)?;
+            }
+            task.fine(reached, observe)
+        });
+    let alone = matches!(task.rivals, Rivals::None(_));
     match first {
-        Ok(found) if is_sure(task, &found) => Ok(Best {
+        Ok(found) if alone || is_sure(task, &found) => Ok(Best {
             candidate: found.candidate,
             sums: found.sums,
             iterations: found.candidate.passes,
             starts: 1,
             ratio: 0.0,
         }),
+        Err(error) if alone => Err(error),
         unsure => compete(task, unsure, observe),
     }
+}
+
+/// Whether a candidate may be worth `least` once its fine passes are made.
+fn may_be_worth(task: &Task<'_>, reached: Reached, least: f32) -> Result<(), MatchError> {
+    let score = task.judged(reached, task.config.coarse_beams).value;
+    if score + GAIN < math::max(least, task.config.min_score) {
+        return Err(MatchError::Unlikely { score });
+    }
+    Ok(())
 }
 
 /// Lets other starts compete with what was found from the guess.
@@ -226,7 +243,9 @@ fn compete(
         Search::Global => around(task, &mut race, &GLOBAL),
         Search::Local => {
             let near = around(task, &mut race, &NEAR);
-            let likely = race.is_likely() || first.as_ref().is_ok_and(|b| is_likely(&b.candidate));
+            let likely = task.rivals == Rivals::Near
+                || race.is_likely()
+                || first.as_ref().is_ok_and(|b| is_likely(&b.candidate));
             if likely {
                 near
             } else {
@@ -257,7 +276,8 @@ fn settle(
     let (mut rival, mut passes) = (f32::NEG_INFINITY, race.passes);
     for (candidate, worth) in &race.places {
         // Fine passes add to what a candidate is worth, but not so much.
-        if *worth + GAIN < most && candidate.value + GAIN < highest {
+        let could = candidate.value + GAIN;
+        if could < task.config.min_score || (*worth + GAIN < most && could < highest) {
             continue;
         }
         let Ok(found) = task.fine(candidate.reached(), observe) else {
