@@ -43,19 +43,20 @@ fn score(outcome: &Result<Match, Refusal>) -> f32 {
 impl<const N: usize> Odometry<N> {
     /// Matches the scan, deskewed with `twist`, at another pose, and takes that match if it explains the scan better.
     #[inline]
-    fn improve(&self, best: &mut Attempt, twist: Twist, predicted: Pose, prior: &Prior) {
-        // Others compete with a guess that alone explains more than what is known.
-        for rivals in [Rivals::None(score(best.outcome)), self.rivals()] {
-            let outcome = self.try_match(predicted, prior, rivals);
-            if score(&outcome) <= score(best.outcome) {
-                return;
-            }
-            if matches!(rivals, Rivals::None(_)) {
-                continue;
-            }
+    fn improve(&self, best: &mut Attempt, (twist, predicted): (Twist, Pose), prior: &Prior) {
+        let outcome = self.try_match(predicted, prior, self.rivals());
+        if score(&outcome) > score(best.outcome) {
             *best.outcome = outcome;
             best.twist = twist;
         }
+    }
+
+    /// Whether a pose alone, without the starts around it, leads to a match that explains more than the best one. Costs a
+    /// sixth of a match where it does not.
+    #[inline(never)]
+    fn is_promising(&self, best: &Attempt, predicted: Pose, prior: &Prior) -> bool {
+        let known = score(best.outcome);
+        score(&self.try_match(predicted, prior, Rivals::None(known))) > known
     }
 
     /// Matches the scan at the fallback prior too. Apart, as the other retries are: so that a second result is on the stack
@@ -63,7 +64,7 @@ impl<const N: usize> Odometry<N> {
     #[inline(never)]
     pub(super) fn retry_fallback(&self, prior: &Prior, times: Times, best: &mut Attempt) {
         if let Some(guess) = self.fallback_prior(prior, times) {
-            self.improve(best, best.twist, guess, prior);
+            self.improve(best, (best.twist, guess), prior);
         }
     }
 
@@ -88,12 +89,10 @@ impl<const N: usize> Odometry<N> {
                 ..expected
             };
             self.deskewed.assign(scan, twist, &self.config.points);
-            self.improve(
-                best,
-                twist,
-                self.pose * twist.displacement(times.seconds),
-                prior,
-            );
+            let predicted = self.pose * twist.displacement(times.seconds);
+            if self.is_promising(best, predicted, prior) {
+                self.improve(best, (twist, predicted), prior);
+            }
             if !best.is_unsure() {
                 break;
             }
