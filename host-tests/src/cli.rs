@@ -14,6 +14,7 @@ mod regress;
 mod replay;
 mod scenes;
 mod simulate;
+mod teach;
 mod tune;
 mod verify;
 mod watch;
@@ -51,6 +52,7 @@ enum Command {
     Prune(prune::Args),
     Scenes(scenes::Args),
     Worlds(worlds::Args),
+    Teach(teach::Args),
     Tune(tune::Args),
     Verify(verify::Args),
     Watch(watch::Args),
@@ -75,6 +77,7 @@ pub fn run() -> ExitCode {
         Some(Command::Prune(args)) => prune::run(&args),
         Some(Command::Scenes(args)) => scenes::run(&args),
         Some(Command::Worlds(args)) => worlds::run(&args),
+        Some(Command::Teach(args)) => teach::run(&args),
         Some(Command::Tune(args)) => tune::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
         Some(Command::Watch(args)) => watch::run(&args),

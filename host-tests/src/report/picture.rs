@@ -6,6 +6,7 @@ pub mod density;
 pub mod heat;
 pub mod map;
 pub mod pair;
+pub mod sweeps;
 
 use std::fs::File;
 use std::io::BufWriter;

@@ -98,16 +98,26 @@ pub fn run(
     entry: &Entry,
     seed: u64,
     change: impl Fn(OdometryConfig) -> OdometryConfig,
-    mut observe: impl FnMut(f64, &Step, TruePose),
+    observe: impl FnMut(f64, &Step, TruePose),
 ) -> Outcome {
     let scene = (entry.make)(seed);
     let scans = scene.run(seed);
+    drive(&scene, &scans, change, observe)
+}
+
+/// Runs a scene whose scans are there; `change` changes the default settings.
+pub fn drive(
+    scene: &Scene,
+    scans: &[Revolution],
+    change: impl Fn(OdometryConfig) -> OdometryConfig,
+    mut observe: impl FnMut(f64, &Step, TruePose),
+) -> Outcome {
     let config = change(OdometryConfig::DEFAULT.with_mount(Mount {
         robot_from_lidar: scene.mount.into(),
         ..Mount::DEFAULT
     }));
     let size = size::fitting(scans.iter().map(|scan| &scan.beams[..]));
-    sized!(size, follow(&scene, &scans, config, &mut observe))
+    sized!(size, follow(scene, scans, config, &mut observe))
 }
 
 /// Follows the robot with room for N beams a revolution.

@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::path::Path;
 
 use host_tests::formats::ros_map;
+use host_tests::shared;
 
 use crate::common::tool::{beamfix, folder, json, text};
 
@@ -91,4 +92,43 @@ fn what_is_replayed_is_not_written_over() {
     assert_eq!(run.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&run.stderr).contains("overwritten"));
     assert_eq!(fs::read(&recording).expect("a recording"), before);
+}
+
+/// Pictures, recording and a line of summary: of a run into `folder`, by one command.
+fn leaves_all(arguments: &[&str], folder: &Path) {
+    let _ = fs::remove_dir_all(folder);
+    let run = beamfix(&[arguments, &["--out", text(folder)]].concat());
+    let said = String::from_utf8_lossy(&run.stdout);
+    assert!(said.contains("pose hash"), "{arguments:?}: {said}");
+    for name in ["map.png", "errors.svg", "run.mcap"] {
+        let bytes = fs::read(folder.join(name)).expect(name);
+        assert!(bytes.len() > 1000, "{arguments:?}: {name}");
+    }
+}
+
+#[test]
+fn one_command_leaves_all_of_it_in_every_world_and_for_every_log() {
+    let folder = folder("leave-all");
+    for (world, _) in beamfix_sim::place::NAMES {
+        leaves_all(&["--world", world, "--seconds", "5"], &folder);
+    }
+    let mut logs = 0;
+    for kind in ["logs", "lowcost"] {
+        let Some(shared) = shared::folder() else {
+            println!("left out: the logs of ../shared/datasets/{kind} are not there");
+            continue;
+        };
+        let path = shared.join("datasets").join(kind);
+        for entry in fs::read_dir(path).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if [".log.gz", ".lscan"]
+                .iter()
+                .any(|end| text(&path).ends_with(end))
+            {
+                leaves_all(&["replay", text(&path), "--scans", "60"], &folder);
+                logs += 1;
+            }
+        }
+    }
+    println!("{logs} logs replayed");
 }

@@ -78,3 +78,33 @@ fn nothing_is_wrong_and_confident_in_a_built_in_place() {
         assert!((found - told).abs() < 1e-6, "{key}: {found}, {told}");
     }
 }
+
+#[test]
+fn what_an_error_depends_on_is_drawn() {
+    let picture = folder("teach").join("teach.svg");
+    let out = ["teach", "--seeds", "1", "--out", text(&picture), "--json"];
+    let value = json(&beamfix(&out));
+    let drawn = fs::read_to_string(&picture).expect("a picture");
+    let quantities = value["quantities"].as_array().expect("a list");
+    assert_eq!(quantities.len(), 6, "{value}");
+    for quantity in quantities {
+        let name = quantity["quantity"].as_str().expect("a name");
+        assert!(drawn.contains(name), "{name} is not drawn");
+        let errors = |line: usize| -> Vec<f64> {
+            let line = quantity["errors_cm"][line].as_array().expect("a line");
+            line.iter()
+                .map(|error| error.as_f64().expect("cm"))
+                .collect()
+        };
+        if name.starts_with("wheel slip") {
+            // Without wheels nothing slips.
+            let blind = errors(1);
+            assert!(blind.iter().all(|error| *error == blind[0]), "{blind:?}");
+        }
+        if name.starts_with("range noise") {
+            // From exact ranges to 8 cm: far beyond what chance does.
+            let with = errors(0);
+            assert!(with[5] > 3.0 * with[0], "{with:?}");
+        }
+    }
+}
