@@ -1,5 +1,6 @@
 //! Matchers: what they find, what they refuse, and what a match costs.
 
+mod algebra;
 #[path = "../common/mod.rs"]
 mod common;
 mod converged;
