@@ -50,7 +50,9 @@ class Program:
         with open(path, "rb") as file:
             elf = ELFFile(file)
             sections = [(s["sh_addr"], s.data(), s["sh_flags"]) for s in elf.iter_sections() if s["sh_flags"] & 2 and s["sh_type"] == "SHT_PROGBITS"]
-            self.statics = sum(s["sh_size"] for s in elf.iter_sections() if s["sh_flags"] & 1)
+            # riscv-rt has sections for what is left of the RAM.
+            left = (".heap", ".stack")
+            self.statics = sum(s["sh_size"] for s in elf.iter_sections() if s["sh_flags"] & 1 and s.name not in left)
             sizes = elf.get_section_by_name(".stack_sizes").data()
             symbols = [(s["st_value"], s["st_size"], s["st_info"]["type"], s.name) for s in elf.get_section_by_name(".symtab").iter_symbols()]
         self.frames, at = {}, 0
