@@ -7,7 +7,6 @@ mod converged;
 mod correlative;
 mod degenerate;
 mod every_match;
-mod extremes;
 mod field;
 mod host_cost;
 mod staged;

@@ -129,10 +129,7 @@ pub(super) fn run(
 /// Bits that bring every lever below 2¹³, the bound of a weighted normal: as many as the farthest place has that a
 /// point can come to lie at.
 pub(super) fn lever_shift(points: &[ScanPoint], start: FixedPose) -> u32 {
-    // The place of a point that no scan has may be farther than its range.
-    let ranges = points.iter().fold(0, |bits, p| {
-        bits | p.range | p.x.unsigned_abs() | p.y.unsigned_abs()
-    });
+    let ranges = points.iter().fold(0, |bits, p| bits | p.range);
     let moved = start.x.unsigned_abs().max(start.y.unsigned_abs()) / 16 + REACH_MM as u32;
     33 - (u32::from(ranges) | moved).leading_zeros()
 }

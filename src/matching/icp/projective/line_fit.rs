@@ -198,24 +198,15 @@ fn three(run: &[ScanPoint], from: usize, point: &ScanPoint, noise: Noise) -> Opt
         nx,
         ny,
         // A third of the sum, in 1/16 mm.
-        offset: (((a >> 6) + (b >> 6) + (c >> 6))
-            .wrapping_mul(341)
-            .wrapping_add(1 << 9))
-            >> 10,
+        offset: (((a >> 6) + (b >> 6) + (c >> 6)) * 341 + (1 << 9)) >> 10,
     })
 }
 
 /// A surface that faces the lidar: all that can be said of a point on its own.
 fn facing(point: &ScanPoint, inverse: u32) -> Laid {
-    // A point whose range is not its distance, which no scan has, gets no longer normal than others.
-    const LONGEST: i32 = 1100;
-    let along = |p: i16| {
-        let along = i32::from(p).wrapping_mul(inverse as i32) >> 14;
-        along.clamp(-LONGEST, LONGEST)
-    };
     Laid {
-        nx: along(point.x),
-        ny: along(point.y),
+        nx: i32::from(point.x).wrapping_mul(inverse as i32) >> 14,
+        ny: i32::from(point.y).wrapping_mul(inverse as i32) >> 14,
         offset: 0,
     }
 }

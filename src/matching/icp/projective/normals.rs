@@ -188,16 +188,10 @@ fn store(slot: &mut Line, point: &ScanPoint, laid: &Laid, inverse: u32, grid: Gr
     let weight = i32::from(WEIGHT.get((cos >> 5) as usize).copied().unwrap_or(1000));
     // Direction, and lines per radian over the distance: Q15 and Q16 a millimetre.
     let pull = ((((inverse >> 4) * grid.per_radian) >> 10).min(16_383)) as i32;
-    // A little more than any point of a scan has: a cross product with another point stays in 32 bits.
-    const MOST: i32 = 16_500;
-    let towards = |p: i32| {
-        let towards = (p.wrapping_mul(inverse as i32) >> 9).wrapping_mul(pull) >> 15;
-        towards.clamp(-MOST, MOST) as i16
-    };
-    let across = |n: i32| n.wrapping_mul(laid.offset).wrapping_add(1 << 13) >> 14;
+    let towards = |p: i32| ((p.wrapping_mul(inverse as i32) >> 9).wrapping_mul(pull) >> 15) as i16;
     *slot = Line {
-        qx: (px + across(laid.nx)) as i16,
-        qy: (py + across(laid.ny)) as i16,
+        qx: (px + ((laid.nx * laid.offset + (1 << 13)) >> 14)) as i16,
+        qy: (py + ((laid.ny * laid.offset + (1 << 13)) >> 14)) as i16,
         mx: ((laid.nx * weight + 512) >> 10) as i16,
         my: ((laid.ny * weight + 512) >> 10) as i16,
         ux: towards(px),
