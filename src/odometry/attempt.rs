@@ -63,7 +63,9 @@ impl<const N: usize> Odometry<N> {
     /// only during its own match.
     #[inline(never)]
     pub(super) fn retry_fallback(&self, prior: &Prior, times: Times, best: &mut Attempt) {
-        if let Some(guess) = self.fallback_prior(prior, times) {
+        if let Some(guess) = self.fallback_prior(prior, times)
+            && (prior.wheel_twist.is_some() || self.is_promising(best, guess, prior))
+        {
             self.improve(best, (best.twist, guess), prior);
         }
     }
