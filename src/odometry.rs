@@ -40,7 +40,8 @@ impl<const N: usize> Odometry<N> {
     /// last velocity is believed to go on; where that leads to no good match, the robot may also stand, or turn faster
     /// or slower. A scan without a usable match leaves the prediction as the pose, is counted, and says why.
     ///
-    /// Costs a match or two; up to about eight times as much where a scan fits nowhere, as other starts compete then.
+    /// Costs a match or two. A scan that fits nowhere costs up to about eight usual ones without wheels, as other starts compete
+    /// then, and up to about fourteen with them.
     pub fn update(&mut self, scan: &Scan<N>, ego: EgoMotion) -> Step {
         let times = self.times(scan);
         let last = self.motion.twist;
