@@ -51,8 +51,8 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
-    /// Whether a pose alone, without the starts around it, leads to a match that explains more than the best one. Costs a
-    /// sixth of a match where it does not.
+    /// Whether a pose alone, without the starts around it, leads to a match that explains more than the best one. Costs
+    /// the coarse passes alone where it cannot.
     #[inline(never)]
     fn is_promising(&self, best: &Attempt, predicted: Pose, prior: &Prior) -> bool {
         let known = score(best.outcome);
