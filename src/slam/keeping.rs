@@ -151,10 +151,14 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
             theta: -last.odometry.theta,
         };
         let grown = Covariance(covariance.0.plus(&before)).rotated(back);
-        // A difference of two covariances is one itself but for rounding, and for an odometry that lost its way.
+        // A difference of two covariances need not be one. Where it is negative in some direction, even by less than the least
+        // error, the sum with that would tell of a motion known to fractions of a millimetre.
+        let half = Covariance(least.0.scaled(0.5));
+        let is_growth = grown.plus(&half).information().is_some();
         let Sym3 { xx, yy, tt, .. } = grown.0;
         let [xx, yy, tt] = [xx, yy, tt].map(|variance| math::max(variance, 0.0));
         let axes = Covariance(Sym3::diagonal(xx, yy, tt));
+        let grown = if is_growth { grown } else { axes };
         let information = [grown.plus(&least), axes.plus(&least), nothing]
             .iter()
             .filter_map(Covariance::information)

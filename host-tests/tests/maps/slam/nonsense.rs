@@ -60,6 +60,48 @@ fn nonsense_is_bounded_and_no_panic() {
 }
 
 #[test]
+fn a_motion_is_never_known_better_than_the_least_error() {
+    let config = SlamConfig::DEFAULT;
+    let points: Vec<ScanPoint> = (0..90)
+        .map(|k| ScanPoint::at(Bearing(k * 728), 2000))
+        .collect();
+    let mut noise = Noise::new(1, 10);
+    for k in 0..500 {
+        // Covariances of two poses that have nothing to do with each other: their difference is none.
+        let mut told = || {
+            let [a, b, c, d, e, f]: [f32; 6] =
+                std::array::from_fn(|_| noise.even(-0.03, 0.03) as f32);
+            Covariance(Sym3 {
+                xx: a * a + 1e-6,
+                xy: a * b,
+                xt: a * d,
+                yy: b * b + c * c + 1e-6,
+                yt: b * d + c * e,
+                tt: d * d + e * e + f * f + 1e-6,
+            })
+        };
+        let mut slam = Box::new(Slam::<4, 60, 60, 36, 90>::new(config));
+        let there = Pose::new(0.7, -0.9, 0.3);
+        slam.update(Pose::IDENTITY, &told(), Pose::IDENTITY, &points);
+        slam.update(there, &told(), Pose::IDENTITY, &points);
+        let [edge] = slam.graph().edges() else {
+            panic!("one edge")
+        };
+        let known = edge.information.covariance().expect("definite").0;
+        // Half of the least error can be taken off, and it still is a covariance.
+        let (far, turned) = (config.min_chain_sigma, config.min_chain_heading_sigma);
+        let least = 0.49 * far * far;
+        let left = Covariance(Sym3 {
+            xx: known.xx - least,
+            yy: known.yy - least,
+            tt: known.tt - 0.49 * turned * turned,
+            ..known
+        });
+        assert!(left.information().is_some(), "{k}: {known:?}");
+    }
+}
+
+#[test]
 fn scans_given_twice_make_no_keyframe() {
     let mut slam = Box::new(Slam::<24, 60, 60, 36, 90>::new(SlamConfig::DEFAULT));
     let points: Vec<ScanPoint> = (0..90)
