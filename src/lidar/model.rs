@@ -89,7 +89,7 @@ pub enum Start {
     Listen,
     /// These bytes, which are not answered.
     Send(&'static [u8]),
-    /// SLAMTEC's requests: information, health, the best mode, scan.
+    /// SLAMTEC's requests: information, health, the mode that the family's parser reads, scan.
     Rplidar,
     /// YDLIDAR's requests: information, health, scan. Sensors with one wire cannot answer and are listened to.
     Ydlidar {

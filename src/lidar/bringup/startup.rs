@@ -81,10 +81,8 @@ impl Startup {
             talk: match model.start {
                 Start::Listen => Talk::Listen,
                 Start::Send(bytes) => Talk::Send(bytes),
-                Start::Rplidar => Talk::Query(Query::new(&query::RPLIDAR, false)),
-                Start::Ydlidar { keeps_zero } => {
-                    Talk::Query(Query::new(&query::YDLIDAR, keeps_zero))
-                }
+                Start::Rplidar => Talk::Query(Query::rplidar(model.family)),
+                Start::Ydlidar { keeps_zero } => Talk::Query(Query::ydlidar(keeps_zero)),
                 Start::Sick => Talk::Line(Line::sick(model.baud)),
                 Start::Scip => Talk::Line(Line::scip(model.baud)),
             },
@@ -292,24 +290,72 @@ mod tests {
     }
 
     #[test]
-    fn a_new_rplidar_gets_its_best_mode() {
+    fn a_new_rplidar_gets_the_mode_that_its_parser_reads() {
+        // The mode that it recommends, another one, none.
+        for (model, kind) in [
+            (&Model::RPLIDAR_ULTRA, 0x84),
+            (&Model::RPLIDAR_DENSE, 0x85),
+            (&Model::RPLIDAR_ULTRADENSE, 0x86),
+        ] {
+            let mut startup = Startup::new(model, StartConfig::DEFAULT);
+            let end = run(&mut startup, 20, |request| match request {
+                [0xa5, 0x50] => INFO_NEW,
+                [0xa5, 0x52] => GOOD,
+                [0xa5, 0x84, 4, 0x7c, ..] => &[0xa5, 0x5a, 6, 0, 0, 0, 0x20, 0x7c, 0, 0, 0, 3, 0],
+                [0xa5, 0x84, 6, 0x75, 0, 0, 0, 3, ..] => {
+                    &[0xa5, 0x5a, 5, 0, 0, 0, 0x20, 0x75, 0, 0, 0, 0x84]
+                }
+                [0xa5, 0x84, 6, 0x75, 0, 0, 0, 2, ..] => {
+                    &[0xa5, 0x5a, 5, 0, 0, 0, 0x20, 0x75, 0, 0, 0, 0x85]
+                }
+                [0xa5, 0x84, 6, 0x75, ..] => &[0xa5, 0x5a, 5, 0, 0, 0, 0x20, 0x75, 0, 0, 0, 0x81],
+                [0xa5, 0x84, 6, 0x71, ..] => {
+                    &[0xa5, 0x5a, 8, 0, 0, 0, 0x20, 0x71, 0, 0, 0, 0, 0x7f, 0, 0]
+                }
+                [0xa5, 0x82, 5, 3, ..] => &[0xa5, 0x5a, 0x84, 0, 0, 0x40, 0x84],
+                [0xa5, 0x82, 5, 2, ..] => &[0xa5, 0x5a, 0x84, 0, 0, 0x40, 0x85],
+                _ => &[],
+            });
+            let mode = Mode {
+                answer: kind,
+                period_q8: Some(127 << 8),
+            };
+            let wanted = match kind {
+                0x86 => Action::Failed(StartError::NoAnswer { request: 0x84 }),
+                _ => Action::Ready(mode),
+            };
+            assert_eq!(end, (wanted, true), "{}", model.name);
+        }
+    }
+
+    #[test]
+    fn a_new_rplidar_in_standard_scan_is_not_asked_for_modes() {
         let mut startup = Startup::new(&Model::RPLIDAR_SCAN, StartConfig::DEFAULT);
         let end = run(&mut startup, 10, |request| match request {
             [0xa5, 0x50] => INFO_NEW,
             [0xa5, 0x52] => GOOD,
-            [0xa5, 0x84, 4, 0x7c, ..] => &[0xa5, 0x5a, 6, 0, 0, 0, 0x20, 0x7c, 0, 0, 0, 3, 0],
-            [0xa5, 0x84, 6, 0x75, 0, 0, 0, 3, ..] => {
-                &[0xa5, 0x5a, 5, 0, 0, 0, 0x20, 0x75, 0, 0, 0, 0x84]
-            }
-            [0xa5, 0x84, 6, 0x71, 0, 0, 0, 3, ..] => {
-                &[0xa5, 0x5a, 8, 0, 0, 0, 0x20, 0x71, 0, 0, 0, 0, 0x7f, 0, 0]
-            }
-            [0xa5, 0x82, 5, 3, 0, 0, 0, 0, _] => &[0xa5, 0x5a, 0x84, 0, 0, 0x40, 0x84],
+            [0xa5, 0x20] => &[0xa5, 0x5a, 5, 0, 0, 0x40, 0x81],
             _ => &[],
         });
         let mode = Mode {
-            answer: 0x84,
-            period_q8: Some(127 << 8),
+            answer: 0x81,
+            period_q8: None,
+        };
+        assert_eq!(end, (Action::Ready(mode), true));
+    }
+
+    #[test]
+    fn an_old_rplidar_knows_the_first_express_scan() {
+        let mut startup = Startup::new(&Model::RPLIDAR_EXPRESS, StartConfig::DEFAULT);
+        let end = run(&mut startup, 10, |request| match request {
+            [0xa5, 0x50] => INFO_OLD,
+            [0xa5, 0x52] => GOOD,
+            [0xa5, 0x82, 5, 0, 0, 0, 0, 0, _] => &[0xa5, 0x5a, 0x54, 0, 0, 0x40, 0x82],
+            _ => &[],
+        });
+        let mode = Mode {
+            answer: 0x82,
+            period_q8: None,
         };
         assert_eq!(end, (Action::Ready(mode), true));
     }

@@ -2,11 +2,12 @@
 //!
 //! ```text
 //! stop ─▶ drain ─▶ info ─▶ health (─▶ reset ─▶ stop) ─▶ zero angle, where the unit keeps one ─▶ introduced
-//! best mode ─▶ its answer type ─▶ its period ─▶ scan ─▶ streaming         (the modes: RPLIDAR since firmware 1.24)
+//! a mode ─▶ its answer type, until it is the parser's ─▶ its period ─▶ scan ─▶ streaming    (RPLIDAR since firmware 1.24)
 //! ```
 
 use super::action::{Action, Mode};
 use super::config::{StartConfig, StartError};
+use crate::lidar::model::Family;
 use crate::lidar::sensors::rplidar::command::{
     self as rplidar, Answer, Answers, CONF_ANSWER, CONF_PERIOD, CONF_TYPICAL, Health, Info,
 };
@@ -15,7 +16,7 @@ use crate::lidar::wire::request::Request;
 
 /// A maker's commands, and what its sensors may leave out.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Commands {
+struct Commands {
     /// Ends a scan; all its bytes.
     stop: &'static [u8],
     info: u8,
@@ -29,8 +30,15 @@ pub(super) struct Commands {
     may_be_deaf: bool,
 }
 
+/// Answers in standard scan.
+const STANDARD: u8 = 0x81;
+/// Answers in the first express scan.
+const EXPRESS: u8 = 0x82;
+/// Modes that are looked at, at most: units have up to five.
+const MODES: u16 = 8;
+
 /// SLAMTEC's.
-pub(super) const RPLIDAR: Commands = Commands {
+const RPLIDAR: Commands = Commands {
     stop: &[0xa5, rplidar::STOP],
     info: rplidar::GET_INFO,
     health: [rplidar::GET_HEALTH; 2],
@@ -41,7 +49,7 @@ pub(super) const RPLIDAR: Commands = Commands {
 };
 
 /// YDLIDAR's.
-pub(super) const YDLIDAR: Commands = Commands {
+const YDLIDAR: Commands = Commands {
     // The first two bytes wake it up.
     stop: &[0xa5, 0x00, 0xa5, ydlidar::STOP],
     info: ydlidar::GET_INFO,
@@ -66,6 +74,8 @@ enum Step {
     AnswerType,
     Period,
     Scan,
+    /// No mode answers with what the parser reads.
+    NoSuchMode,
     Streaming,
     Failed(StartError),
 }
@@ -98,16 +108,39 @@ pub(super) struct Query {
     tries: u8,
     was_reset: bool,
     scan_mode: Option<u16>,
+    /// The answers that the parser reads; `None` where there is one kind.
+    wanted: Option<u8>,
+    /// The mode that is looked at next, after the one that the maker recommends.
+    next_mode: u16,
     mode: Mode,
     keeps_zero: bool,
     zero: Option<i32>,
 }
 
 impl Query {
-    /// At the beginning; a unit that keeps its zero angle is asked for it.
-    pub(super) const fn new(commands: &'static Commands, keeps_zero: bool) -> Self {
+    /// At the beginning, for an RPLIDAR that is to answer with what the family's parser reads.
+    pub(super) const fn rplidar(family: Family) -> Self {
+        let wanted = match family {
+            Family::RplidarExpress => EXPRESS,
+            Family::RplidarHq => 0x83,
+            Family::RplidarUltra => 0x84,
+            Family::RplidarDense => 0x85,
+            Family::RplidarUltraDense => 0x86,
+            _ => STANDARD,
+        };
+        Self::new(&RPLIDAR, Some(wanted), false)
+    }
+
+    /// At the beginning; a YDLIDAR that keeps its zero angle is asked for it.
+    pub(super) const fn ydlidar(keeps_zero: bool) -> Self {
+        Self::new(&YDLIDAR, None, keeps_zero)
+    }
+
+    const fn new(commands: &'static Commands, wanted: Option<u8>, keeps_zero: bool) -> Self {
         Self {
             commands,
+            wanted,
+            next_mode: 0,
             keeps_zero,
             zero: None,
             step: Step::Stop,
@@ -149,16 +182,21 @@ impl Query {
         rplidar::request(rplidar::MOTOR_PWM, &rplidar::MOTOR_PWM_USUAL.to_le_bytes())
     }
 
-    /// Goes on to the scan, by its best mode where it has some.
+    /// Goes on to the scan, in the mode that the parser reads.
     pub(super) fn begin_scan(&mut self) {
-        // GET_CONF came with firmware 1.24.
+        // GET_CONF came with firmware 1.24. The standard scan and the first express scan are older.
         let has_modes =
             self.commands.has_modes && self.info.is_some_and(|info| info.firmware >= (1, 24));
-        self.go(if has_modes {
-            Step::TypicalMode
-        } else {
-            Step::Scan
-        });
+        self.next_mode = 0;
+        match self.wanted {
+            None | Some(STANDARD) => self.go(Step::Scan),
+            _ if has_modes => self.go(Step::TypicalMode),
+            Some(EXPRESS) => {
+                self.scan_mode = Some(0);
+                self.go(Step::Scan);
+            }
+            Some(_) => self.go(Step::NoSuchMode),
+        }
     }
 
     /// What is to be done (µs, wrapping); `None` once the sensor is introduced, and once it streams.
@@ -167,6 +205,7 @@ impl Query {
         Some(match (self.step, waited_ms) {
             (Step::Introduced | Step::Streaming, _) => return None,
             (Step::Failed(error), _) => Action::Failed(error),
+            (Step::NoSuchMode, _) => self.give_up(),
             (Step::Stop, _) => {
                 self.go(Step::Drain);
                 self.since_us = Some(now_us);
@@ -216,10 +255,12 @@ impl Query {
             Step::Info | Step::Health if self.commands.may_be_deaf => Step::Introduced,
             Step::ZeroAngle => Step::Introduced,
             Step::Scan if self.commands.may_be_deaf && self.info.is_none() => Step::Streaming,
-            Step::TypicalMode | Step::AnswerType | Step::Period => {
-                self.scan_mode = None;
+            // The first express scan can be asked for blindly.
+            Step::TypicalMode | Step::AnswerType if self.wanted == Some(EXPRESS) => {
+                self.scan_mode = Some(0);
                 Step::Scan
             }
+            Step::Period => Step::Scan,
             _ => {
                 let request = self.command();
                 let error = StartError::NoAnswer { request };
@@ -299,7 +340,8 @@ impl Query {
                     self.take_conf(entry, value);
                 }
             }
-            Step::Scan if answer.streams => {
+            // An older stream may still run.
+            Step::Scan if answer.streams && self.wanted.is_none_or(|kind| kind == answer.kind) => {
                 self.mode.answer = answer.kind;
                 self.go(Step::Streaming);
             }
@@ -313,14 +355,16 @@ impl Query {
                 self.scan_mode = Some(value as u16);
                 self.go(Step::AnswerType);
             }
-            (Step::AnswerType, CONF_ANSWER) => {
-                // A mode with an answer of its own, or the standard scan.
-                if value as u8 == 0x81 {
-                    self.scan_mode = None;
-                }
+            (Step::AnswerType, CONF_ANSWER) if self.wanted == Some(value as u8) => {
                 self.mode.answer = value as u8;
                 self.go(Step::Period);
             }
+            (Step::AnswerType, CONF_ANSWER) if self.next_mode < MODES => {
+                self.scan_mode = Some(self.next_mode);
+                self.next_mode += 1;
+                self.go(Step::AnswerType);
+            }
+            (Step::AnswerType, CONF_ANSWER) => self.go(Step::NoSuchMode),
             (Step::Period, CONF_PERIOD) => {
                 self.mode.period_q8 = Some(value);
                 self.go(Step::Scan);
