@@ -47,7 +47,8 @@ pub struct Match {
     pub information: Information,
     /// Beams that agree with the reference.
     pub inliers: u16,
-    /// Beams that met a part of the reference that could have answered.
+    /// Beams that met a part of the reference that could have answered: a surface in their direction, an explored cell of a map.
+    /// ICP estimates their number from at most 120 beams, evenly spread.
     pub overlap: u16,
     /// Beams given.
     pub beams: u16,

@@ -1,8 +1,9 @@
-//! Where the robot is by its scans alone: each is matched against a keyframe, from a guess by wheels, gyroscope or the
-//! last velocity.
+//! Scan-to-keyframe odometry: each scan is matched against a keyframe, from a pose predicted by wheels, gyroscope or the
+//! last velocity; match and prediction are then fused, weighted by their covariances.
 //!
-//! [`Odometry::update`] is the whole of it: predict, deskew, match, retry, refine, decide, keep. A keyframe (a scan that
-//! later ones are matched against) stays as long as possible, because only a change of keyframe adds up errors.
+//! [`Odometry::update`] is the whole of it: predict, deskew, match, retry, reject; then refine and fuse, or coast; then keep
+//! as a keyframe. A keyframe (a scan that later ones are matched against) stays as long as possible, because only a change
+//! of keyframe and a scan without a match add up errors.
 
 mod attempt;
 mod config;
@@ -36,9 +37,14 @@ use prior::Prior;
 impl<const N: usize> Odometry<N> {
     /// Takes a scan in and says where the robot is.
     ///
-    /// `ego` is the robot's motion since the last scan's end as its wheels and gyroscope measured it. Without them the
-    /// last velocity is believed to go on; where that leads to no good match, the robot may also stand, or turn faster
-    /// or slower. A scan without a usable match leaves the prediction as the pose, is counted, and says why.
+    /// `ego` is the robot's motion since the last scan's end as its wheels and gyroscope measured it. Without wheels the
+    /// last velocity is believed to go on, at the gyroscope's rate of turn where there is one. Where the prediction leads to
+    /// no good match, others are tried: with wheels the last velocity, without them a standing robot; and, without either
+    /// wheels or gyroscope, one that turns faster or slower.
+    ///
+    /// [`Step::pose`] is the fused pose, not the match's. A scan without a usable match leaves the prediction as the pose,
+    /// is counted, and says why; after [`OdometryConfig::max_refused`] of them in a row the scan becomes the keyframe, which
+    /// [`Counters::lost`] tells.
     ///
     /// Costs a match or two. A scan that fits nowhere costs up to about eight usual ones without wheels, as other starts compete
     /// then, and up to about fourteen with them.
@@ -79,11 +85,12 @@ impl<const N: usize> Odometry<N> {
         }
 
         self.conclude(&mut step, last, &prior, times);
-        self.end_us = scan.end_us();
+        self.end_us = Some(scan.end_us());
         step
     }
 
-    /// Keeps the scan as a keyframe if it is to be one, counts it, and tells where the robot is.
+    /// Finishes a step: the decision about a keyframe, the counters, and the covariance of the motion within the scan, which
+    /// no match sees.
     #[inline(never)]
     fn conclude(&mut self, step: &mut Step, last: Twist, prior: &Prior, times: Times) {
         let skew = self.skew(&step.outcome, last, prior.source, times);
@@ -116,7 +123,7 @@ impl<const N: usize> Odometry<N> {
         source: Source,
         times: Times,
     ) -> Covariance {
-        /// What wheels said and no robot can turn between two scans is no rotation (rad).
+        /// Largest difference between the rotation by the wheels and the one that was found that is believed (rad).
         const MAX_ROTATION: f32 = 0.35;
         outcome
             .as_ref()

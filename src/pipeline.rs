@@ -9,9 +9,14 @@
 //! lidar and which estimator are types: [`Odometry`](crate::odometry::Odometry) needs nothing but scans,
 //! [`MapLocalizer`] a map too.
 //!
-//! Every input has a time (µs, wrapping) on one clock, the caller's: [`Pipeline::set_time`] says when the bytes pushed
-//! next came in, wheels and gyroscope bring theirs. A revolution ends when the byte that completes it comes in; what the
-//! wheels said is interpolated there, so their messages may come at any rate, and one may be lost.
+//! Wheels, gyroscope and bytes have a time (µs, wrapping) on the caller's clock: [`Pipeline::set_time`] says when the bytes
+//! pushed next came in, wheels and gyroscope bring theirs. Beams have the lidar's own times where it has a clock. For wheels
+//! and gyroscope a revolution ends when the bytes that complete it come in, up to a packet after its last beam. The pose by
+//! the wheels there is interpolated, or extrapolated over up to three of their messages' intervals: messages may come at any
+//! rate from two a second on, and one may be lost of those that come four times a second or more.
+//!
+//! An estimator that has work to do between two revolutions, such as [`MapLocalizer`]'s search for a lost pose or a map's
+//! loops, does it in [`Estimator::work`], which nothing here calls: `pipeline.tracker_mut().estimator_mut().work(budget)`.
 
 mod estimator;
 mod gyro;
@@ -125,6 +130,8 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
     #[inline(never)]
     fn receive(&mut self, bytes: &[u8]) -> usize {
         let mut taken = 0;
+        // The last packet has been passed on: without bytes there is none.
+        self.packet = None;
         for &byte in bytes {
             taken += 1;
             self.packet = self.lidar.push(byte);

@@ -51,8 +51,8 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
-    /// Whether a pose alone, without the starts around it, leads to a match that explains more than the best one. Costs
-    /// the coarse passes alone where it cannot.
+    /// Whether a pose alone, without the starts around it, leads to a match that explains more than the best one. Stops
+    /// after the coarse passes where its score cannot become higher than the best one's.
     #[inline(never)]
     fn is_promising(&self, best: &Attempt, predicted: Pose, prior: &Prior) -> bool {
         let known = score(best.outcome);
@@ -104,8 +104,8 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
-    /// Places the robot where the match puts it. If that implies another velocity than the scan was deskewed with, deskews
-    /// and matches again first.
+    /// Fuses match and prior, and places the robot there. If the match implies another velocity than the scan was deskewed
+    /// with, deskews and matches again first.
     #[inline(never)]
     pub(super) fn refine(
         &mut self,
@@ -172,15 +172,16 @@ impl<const N: usize> Odometry<N> {
             .covariance_at(pose, &self.tracking.covariance());
     }
 
-    /// Refuses a match that fits as well with another heading, where the prior does not tell which of them it is: after a
-    /// gap without wheels, in a room that looks the same from several sides.
+    /// Tries other headings where the prior does not tell which of them it is, after a gap without wheels in a room that
+    /// looks the same from several sides: takes the match that explains most, and refuses it if another explains about as
+    /// much.
     #[inline(never)]
     pub(super) fn refuse_ambiguous(&self, prior: &Prior, best: &mut Attempt) {
         /// A heading known better than this (rad) decides between two sides of a hexagon.
         const SURE: f32 = 0.3;
-        /// Headings that are tried, and how far apart two of them are (rad). Twelve are 30° apart: a room of three, four or
-        /// six equal sides has its others there.
+        /// Headings that are tried, 30° apart: a room of three, four or six equal sides has its others there.
         const SIDES: u8 = 12;
+        /// A match whose heading differs by more than this (rad) is another one.
         const APART: f32 = 0.3;
         /// A match elsewhere that explains this share of what the best does is as good.
         const AS_GOOD: f32 = 0.95;
@@ -258,7 +259,7 @@ impl<const N: usize> Odometry<N> {
     ) -> Result<Match, Refusal> {
         let needed = self.config.icp.min_inliers.saturating_mul(2);
         let points = self.deskewed.points.as_slice();
-        if self.counters.keyframes == 0 {
+        if self.keyframe.reference.is_empty() {
             let found = points.len() as u16;
             return Err(if found < needed {
                 Refusal::NoMatch(MatchError::TooFewBeams { found, needed })
@@ -279,7 +280,8 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
-    /// The starts that may compete with a prediction: as far from it as the heading may be.
+    /// The starts that may compete with a prediction: few where the heading is known to 20° (four standard deviations), else
+    /// all.
     pub(super) fn rivals(&self) -> Rivals {
         /// So many standard deviations of the heading are within the starts near by (20°).
         const MAX_SIGMAS: f32 = 4.0;
@@ -291,8 +293,8 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
-    /// Whether the prior tells two poses apart that a match may confuse. The last scan's place is the one that its match
-    /// chose.
+    /// Whether the prior tells two poses apart that a match may confuse. After a scan with a match only the motion since then
+    /// is uncertain: its place is the one that its match chose.
     fn is_decided(&self, prior: &Prior) -> bool {
         /// Two poses of a match that differ by less (m, a rotation counted at 3 m) are one.
         const SAME: f32 = 0.15;
@@ -304,7 +306,8 @@ impl<const N: usize> Odometry<N> {
         known.xx + known.yy + 9.0 * known.tt < SAME * SAME
     }
 
-    /// A match, unless it is too far from its guess. A guess that may be far off is corrected by as much.
+    /// A match, unless it is too far from its guess: farther than [`OdometryConfig::max_correction`](super::OdometryConfig)
+    /// allows, and two standard deviations of the guess.
     #[inline]
     fn near_enough(&self, found: Match, guess: Pose) -> Result<Match, Refusal> {
         let limit = self.config.max_correction * found.score;
@@ -324,7 +327,7 @@ impl<const N: usize> Odometry<N> {
         let Ok(found) = &*best.outcome else {
             return;
         };
-        /// So many scans in a row may be refused for it: then the wheels are wrong, and the scans agree.
+        /// After so many refused scans in a row a match is not refused for contradicting the wheels: they are wrong then.
         const MAX_DOUBTED: u8 = 2;
         let doubtful = best.is_unsure()
             && self.refused_in_a_row < MAX_DOUBTED

@@ -29,13 +29,14 @@ pub struct OdometryConfig {
     /// A new keyframe is made when fewer than this share of the beams meet the last one's surfaces. Default 0.6.
     pub keyframe_overlap: f32,
     /// Farthest accepted distance of a match from its guess for a match that explains every beam (m; twice as many
-    /// radians); for one that explains half of them it is half as far. Default 0.45: wheels that slip or spin, not
-    /// another room.
+    /// radians); for one that explains half of them it is half as far. Two standard deviations of the predicted pose are
+    /// added. Default 0.45: wheels that slip or spin, not another room.
     pub max_correction: f32,
-    /// Standard deviation of the predicted motion, as a share of its distance and of its rotation. Default 0.1.
+    /// Standard deviation of the motion by the wheels that is assumed at the start, as a share of its distance and of its
+    /// rotation; while driving it follows from how far matches differ from the wheels. Unused without wheels. Default 0.1.
     pub prior_error: f32,
-    /// Refused scans in a row after which the keyframe is given up. Default 10: an occlusion of up to a second at 10 Hz
-    /// does not lose the keyframe.
+    /// The refused scan in a row that becomes the keyframe in place of the one it does not fit, if it has at least twice
+    /// `icp.min_inliers` points. Default 10: an occlusion of less than a second at 10 Hz does not lose the keyframe.
     pub max_refused: u8,
     /// Settings of the matcher. Default [`IcpConfig::DEFAULT`], but a direction counts as degenerate below a share of
     /// 0.035: along a corridor the guess is better than what a few beams tell.

@@ -81,7 +81,7 @@ fn spread(distance: f32, rotation: f32) -> Covariance {
 pub(super) struct WheelErrors {
     translation: Ratio,
     rotation: Ratio,
-    /// What match and wheels differed by in the last scan, and whether that is known (m, m, rad).
+    /// What the last scan added to `off` (m, m, rad), where that is known.
     last: Option<[f32; 3]>,
     /// Difference between match and wheels since the keyframe.
     off: Option<Pose>,
@@ -158,7 +158,7 @@ impl WheelErrors {
         ))
     }
 
-    /// Whether they did about as well as assumed lately.
+    /// Whether the distances that they told were about as good as assumed lately.
     pub fn are_steady(&self) -> bool {
         self.translation.factor() < 4.0
     }

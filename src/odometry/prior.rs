@@ -31,14 +31,15 @@ pub(super) struct Prior {
 }
 
 impl<const N: usize> Odometry<N> {
-    /// Times of a scan; all 0 for the first one and for clocks that stand still or jump.
+    /// Times of a scan; all 0 for the first one and for a clock that stands still. After a jump of the clock `seconds` and
+    /// `duration` are 0 and `elapsed` is a guess.
     pub(super) fn times(&mut self, scan: &Scan<N>) -> Times {
         /// A clock that says more between two scans, ahead or back, has been set, or scans are missing (s).
         const MAX_STEP: f32 = 2.0;
-        let micros = scan.end_us().wrapping_sub(self.end_us);
-        if self.counters.scans == 0 {
+        let Some(end_us) = self.end_us else {
             return Times::default();
-        }
+        };
+        let micros = scan.end_us().wrapping_sub(end_us);
         if micros == 0 {
             return Times::default();
         }

@@ -26,7 +26,8 @@ pub struct Odometry<const N: usize> {
     pub(super) motion: Motion,
     pub(super) tracking: Tracking,
     pub(super) wheel_errors: WheelErrors,
-    pub(super) end_us: u32,
+    /// End of the last scan (µs), where there was one.
+    pub(super) end_us: Option<u32>,
     pub(super) refused_in_a_row: u8,
     pub(super) counters: Counters,
 }
@@ -44,7 +45,7 @@ impl<const N: usize> Odometry<N> {
             motion: Motion::STANDING,
             tracking: Tracking::at(Pose::IDENTITY, 0.0),
             wheel_errors: WheelErrors::new(),
-            end_us: 0,
+            end_us: None,
             refused_in_a_row: 0,
             counters: Counters {
                 scans: 0,
@@ -69,7 +70,8 @@ impl<const N: usize> Odometry<N> {
         self.motion.twist
     }
 
-    /// The last scan's points, in the lidar's frame at the scan's end.
+    /// The last scan's points, in the lidar's frame at the scan's end; of a scan that became the keyframe, after they were
+    /// moved towards the surfaces of the keyframe before and without what moved along with the robot.
     #[must_use]
     pub const fn points(&self) -> &Points<N> {
         &self.deskewed.points
@@ -79,5 +81,15 @@ impl<const N: usize> Odometry<N> {
     #[must_use]
     pub const fn counters(&self) -> Counters {
         self.counters
+    }
+
+    /// The same odometry as if it had come to `pose` with these counters before its first scan: what a month leaves behind, for
+    /// the project's own tests.
+    #[cfg(feature = "internals")]
+    #[must_use]
+    pub const fn after(mut self, pose: Pose, counters: Counters) -> Self {
+        self.pose = pose;
+        self.counters = counters;
+        self
     }
 }

@@ -27,11 +27,11 @@ pub struct Step {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refusal {
-    /// The first scan: there was nothing to match against.
+    /// There is nothing to match against yet.
     First,
     /// The matcher found no pose.
     NoMatch(MatchError),
-    /// The match is too far from the guess to be believed.
+    /// The match is too far from the guess to be believed, or contradicts wheels that were right up to now.
     TooFar {
         /// Distance between the two (m).
         distance: f32,

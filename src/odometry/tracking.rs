@@ -14,9 +14,9 @@ pub(super) struct Tracking {
     pub shared: f32,
     /// Covariance of the keyframe's own noise, as part of the last match.
     pub noise: Covariance,
-    /// Displacement (m) that the pose is off by if the last match was wrongly doubted.
+    /// Displacement (m) that the pose is off by if it was decided wrongly whether something moves along with the robot.
     pub doubt: [f32; 2],
-    /// Where the wheels alone say that the robot is.
+    /// Where the robot is by the predicted motions alone since the keyframe; by the wheels where there are any.
     pub wheels: Pose,
     /// Time since the robot's velocity was measured last (s).
     pub coasting: f32,

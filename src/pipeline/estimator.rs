@@ -15,8 +15,8 @@ pub trait Estimator<const N: usize> {
     /// Takes the next scan, and the robot's motion since the one before as far as wheels and gyroscope told it.
     fn update(&mut self, scan: &Scan<N>, ego: EgoMotion) -> Self::Step;
 
-    /// Does a bounded part of what can wait, about `budget` bytes looked up; true where nothing is left to do before the
-    /// next scan.
+    /// Does a bounded part of what can wait; true where nothing is left to do before the next scan. The budget's unit is
+    /// the estimator's: see its own page.
     fn work(&mut self, budget: u32) -> bool {
         let _ = budget;
         true

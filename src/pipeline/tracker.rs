@@ -56,13 +56,13 @@ impl<E, const N: usize> Tracker<E, N> {
     }
 
     /// Takes the robot's pose by its wheels at a time (µs), in a frame of their own; a pose that is not finite is left
-    /// out. Messages may come at any rate from two a second on.
+    /// out. Messages may come at any rate from two a second on, four if one may be lost.
     pub fn push_wheels(&mut self, time_us: u32, pose: Pose) {
         self.inertial.wheels.push(time_us, pose);
     }
 
     /// Takes the robot's rate of turn by a gyroscope at a time (µs), counter-clockwise (rad/s). Messages should come at
-    /// least 20 times a second; over a longer gap the gyroscope tells nothing.
+    /// least 20 times a second, so that one may be lost: over a gap of more than 100 ms the gyroscope tells nothing.
     pub fn push_gyro(&mut self, time_us: u32, rate: f32) {
         self.inertial.gyro.push(time_us, rate);
     }
@@ -112,7 +112,7 @@ impl<E: Estimator<N>, const N: usize> Tracker<E, N> {
         });
     }
 
-    /// Takes the beams of a whole scan, of a log that has no bytes; they came in when the last one was measured.
+    /// Takes the beams of a whole scan, of a log that has no bytes. The time of its last beam becomes the time of now.
     pub fn push_scan(
         &mut self,
         beams: impl Iterator<Item = Beam>,

@@ -11,7 +11,8 @@
 //!
 //! Everything goes through [`Pipeline`](beamfix_core::Pipeline), as on every other board. The only `unsafe` code of the project
 //! besides the boards' registers is here, because a C caller hands over plain pointers.
-#![no_std]
+// A fuzzer has a panic handler of its own.
+#![cfg_attr(not(fuzzing), no_std)]
 
 mod lidars;
 mod object;

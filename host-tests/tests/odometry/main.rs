@@ -7,4 +7,5 @@ mod interrupted;
 mod pipeline;
 mod replay;
 mod simulate;
+mod soak;
 mod sparse;

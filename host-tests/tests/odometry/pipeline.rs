@@ -382,3 +382,32 @@ fn wheels_of_any_rate_and_a_gyroscope_lead_through_a_cover_that_blinds_the_lidar
     }
     assert!(failed.is_empty(), "blind {blind:?}: {failed:?}");
 }
+
+#[test]
+fn no_bytes_are_no_packet() {
+    let drive = driven(3.0);
+    let mut board = beamfix::Pipeline::new(
+        beamfix::lidar::ld06::Parser::new(),
+        Odometry::<BEAMS>::new(OdometryConfig::DEFAULT),
+    );
+    let mut sink = Frames(0);
+    let mut start = 0;
+    for &(end, _) in &drive.frames {
+        board.push(&drive.bytes[start..end], &mut sink);
+        // As a board may ask whose ring is empty.
+        assert_eq!(board.push_packet(&[], &mut sink), 0);
+        start = end;
+    }
+    assert_eq!(sink.0, drive.frames.len());
+}
+
+/// Counts packets.
+struct Frames(usize);
+
+impl<P> beamfix::pipeline::Sink<P, Odometry<BEAMS>, BEAMS> for Frames {
+    fn revolution(&mut self, _: beamfix::Revolution<'_, Odometry<BEAMS>, BEAMS>) {}
+
+    fn packet(&mut self, _: &P) {
+        self.0 += 1;
+    }
+}

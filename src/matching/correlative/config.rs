@@ -17,7 +17,8 @@ pub struct CorrelativeConfig {
     pub max_ambiguity: f32,
     /// Nearer modes are the same pose (m). Default 0.5.
     pub min_separation: f32,
-    /// Each beam's log-likelihood counts so much in the covariance: neighbours err alike. Default 0.1.
+    /// Exponent of each beam's likelihood in the covariance, 1 for beams that err independently. Default 0.1: neighbours err
+    /// alike.
     pub temper: f32,
 }
 

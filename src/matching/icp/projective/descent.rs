@@ -1,4 +1,4 @@
-//! From a start to a pose: coarse passes over a few points, then fine ones until nothing moves.
+//! From a start to a pose: coarse passes over a few points, then fine ones until two steps are short against the covariance.
 
 use crate::{
     geometry::Pose,
@@ -23,7 +23,7 @@ const KNOWN_WIDTH: u32 = 512;
 /// A step that is this short compared with the gate narrows it to a quarter, or to half.
 const SHORT: f32 = 1.0 / 16.0;
 const MEDIUM: f32 = 1.0 / 4.0;
-/// Width of the last gate in fifths of a standard deviation of a range: half weight at 2 of them.
+/// Width of the last gate in fifths of a standard deviation of a range: half weight at two standard deviations.
 const FINE_FIFTHS: u32 = 64;
 /// Most fine passes, each over half of the points. Those of recorded scans need 3 to 9.
 const FINE_MOST: u8 = 24;

@@ -35,14 +35,15 @@ const LIKELY: f32 = 0.5;
 /// range is: nine in ten of the wrong poses on recorded scans lie along a direction that is known worse.
 const SURE_NEAR: f32 = 0.6;
 const NEARBY: f32 = 0.35;
-/// Far from the guess (m; a turn counted at 3 m).
+/// Far from the guess (m; a rotation counted at 3 m).
 const FAR_OFF: f32 = 0.75;
 /// A second pose that is worth this share of the best makes the match ambiguous.
 const AMBIGUOUS: f32 = 0.95;
 /// In a local search that ended far from the guess, the ambiguity limit is this times the score: the less a pose explains,
 /// the likelier is another one.
 const DOUBTFUL: f32 = 1.2;
-/// The same near the guess, which decides between places that explain about as much of the scan if they explain most of it.
+/// The same for a search that ended near the guess: a guess decides between places that explain about as much of the scan if
+/// they explain most of it.
 const UNDECIDED: f32 = 1.4;
 /// What a start loses per square metre between its end and the guess: a guess is worth something.
 const NEAR_PULL: f32 = 2.5;
@@ -80,13 +81,15 @@ const GLOBAL: Ring = Ring {
 /// Starts moved along the direction that is known least (m): from what a gate still sees to what it does not.
 const SLIDES: [f32; 8] = [0.1, -0.1, 0.25, -0.25, 0.5, -0.5, 1.0, -1.0];
 
-/// Two candidates closer than this (m; a turn counted at 3 m) are the same pose, found twice.
+/// Two candidates closer than this (m; a rotation counted at 3 m) are the same pose, found twice.
 const SAME: f32 = 0.15;
 
 /// Candidates whose fine passes are made, and how far apart they are at least (m; a rotation counted at 3 m).
 const KEPT: usize = 3;
 const APART: f32 = 0.08;
+/// A start nearer than this to a pose that was found leads there again (m; a rotation counted at 3 m).
 const KNOWN: f32 = 0.05;
+/// The most that fine passes are assumed to add to a score.
 const GAIN: f32 = 0.15;
 /// A pose elsewhere whose score is higher by this makes a match ambiguous that only its nearness to the guess decided.
 const CLEARLY: f32 = 0.05;
@@ -256,7 +259,8 @@ fn compete(
     settle(task, first, &race, pull, observe)
 }
 
-/// Makes the fine passes of the candidates and takes the one that is worth most, unless there is another one.
+/// Makes the fine passes of the candidates and takes the one that is worth most; refuses as ambiguous if another is nearly as
+/// good.
 fn settle(
     task: &Task<'_>,
     first: Result<Refined, MatchError>,

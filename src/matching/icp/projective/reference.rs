@@ -53,7 +53,7 @@ impl<const N: usize> Reference<N> {
             .unwrap_or(&self.lines)
     }
 
-    /// Number of points that a line could be laid through.
+    /// Number of points with a line: through their neighbours, or facing the lidar where they have none.
     #[must_use]
     pub const fn len(&self) -> u16 {
         self.count

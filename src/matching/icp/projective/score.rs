@@ -11,15 +11,15 @@ use crate::{
 pub(super) struct Score {
     /// Points that met a line.
     pub overlap: u16,
-    /// Points on their line: full ones within a centimetre, half ones at 4 cm, Q6.
+    /// Sum of `1/(1 + (d/4σ)²)` over the points' distances d from their lines, 0 from 8σ on, Q6.
     pub agreement: u32,
     /// Points where the reference saw through to something farther.
     pub in_free_space: u16,
-    /// Points nearer than 8 cm to their line.
+    /// Points nearer than 8σ to their line.
     pub close: u16,
 }
 
-/// `1/(1 + (d/40 mm)²)` by the distance in steps of 2.5 mm up to 80 mm, Q6.
+/// `1/(1 + (d/4σ)²)` by the distance in steps of a quarter of σ up to 8σ, Q6.
 const AGREEMENT: [u8; 32] = agreement();
 
 const fn agreement() -> [u8; 32] {

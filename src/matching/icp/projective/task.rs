@@ -6,7 +6,7 @@ use crate::{
     scan::ScanPoint,
 };
 
-/// Where a search begins, and how far it may go.
+/// Where a search begins, whether that decides between places that look alike, and which other starts it may have.
 #[derive(Clone, Copy)]
 pub(crate) struct Guess {
     pub pose: Pose,
@@ -20,7 +20,7 @@ pub(crate) struct Guess {
 pub(crate) enum Rivals {
     /// None; and where the guess leads to is looked at closely only if it may be worth this much.
     None(f32),
-    /// A few, within 20°: the heading is known better.
+    /// A few within 20°, and some along the direction that is known least. In a global search as `All`.
     Near,
     /// All that the kind of search has.
     All,
