@@ -153,15 +153,19 @@ pub fn read(path: &Path) -> Result<Log> {
 /// content tells which, and `options` what it does not tell.
 pub fn read_with(path: &Path, options: &Options) -> Result<Log> {
     let name = path.display().to_string();
-    if let Some(lidar) = &options.lidar {
-        return capture::log::read(path, lidar);
-    }
-    if path.is_dir() {
+    if path.is_dir() && options.lidar.is_none() {
         let log = ros::parse(ros::bag::Bag::of_folder(path)?, options)
             .map_err(|error| error.context(name.clone()))?;
         return with_scans(log, &name, String::new);
     }
-    let content = bytes::load(path)?;
+    parse(name, bytes::load(path)?, options)
+}
+
+/// [`read_with`] for a file's content, unpacked.
+pub fn parse(name: String, content: bytes::Content, options: &Options) -> Result<Log> {
+    if let Some(lidar) = &options.lidar {
+        return capture::log::parse(&name, content, lidar);
+    }
     if content.bytes.starts_with(capture::MAGIC) {
         return capture::log::parse(&name, content, "auto");
     }

@@ -261,7 +261,7 @@ fn entry(merged: Merged) -> (u32, (u32, Pose)) {
 const DRAWN: f32 = 12.0;
 
 /// The occupancy grid of all keyframes, a slot at a time as a board would draw it.
-fn drawn<const K: usize, const E: usize, const L: usize, const B: usize, const V: usize>(
+pub fn drawn<const K: usize, const E: usize, const L: usize, const B: usize, const V: usize>(
     slam: &mut Slam<K, E, L, B, V>,
     resolution: f32,
 ) -> Result<Grid<Vec<u8>>> {

@@ -8,7 +8,7 @@ use beamfix::pipeline::{Estimate, Estimator, Pipeline as Bytes, Revolution, Trac
 use beamfix::scan::{Beam, Mount};
 
 use crate::decode::{WithParser, with_parser};
-use crate::formats::capture::{self, Content};
+use crate::formats::capture::{self, Content, Piece};
 use crate::formats::{Log, Recorded};
 use crate::report::hash::PoseHash;
 use crate::size;
@@ -177,6 +177,63 @@ fn push_scan<E: Estimator<N>, const N: usize>(
     tracker.push_scan(beams.iter().copied(), ready);
 }
 
+/// Gets each revolution.
+pub type Ready<'a, E, const N: usize> = dyn FnMut(Revolution<'_, E, N>) + 'a;
+
+/// A [`Bytes`] whatever its lidar: a capture goes in piece by piece.
+pub trait Pieces<E: Estimator<N>, const N: usize> {
+    /// Takes what came in together; true where that completed a revolution. Without `ego` wheels and gyroscope are left
+    /// out.
+    fn take(&mut self, piece: &Piece<'_>, ego: bool, ready: &mut Ready<'_, E, N>) -> bool;
+
+    /// Takes a whole scan of a log that has no bytes, and the wheels at its end.
+    fn take_scan(&mut self, recorded: &Recorded, ready: &mut Ready<'_, E, N>);
+
+    /// Takes the packets that the parser has held back: for the end of a capture.
+    fn end(&mut self, ready: &mut Ready<'_, E, N>);
+
+    /// The estimator.
+    fn estimator(&mut self) -> &mut E;
+}
+
+impl<P: Protocol, E: Estimator<N>, const N: usize> Pieces<E, N> for Bytes<P, E, N> {
+    fn take(&mut self, piece: &Piece<'_>, ego: bool, ready: &mut Ready<'_, E, N>) -> bool {
+        let time_us = piece.time_us.map(|time_us| time_us as u32);
+        let mut is_any = false;
+        match (piece.content, time_us) {
+            (Content::Bytes(bytes), _) => {
+                if let Some(time_us) = time_us {
+                    self.set_time(time_us);
+                }
+                self.push(bytes, &mut |revolution: Revolution<'_, E, N>| {
+                    is_any = true;
+                    ready(revolution);
+                });
+            }
+            (Content::Wheels(pose), Some(time_us)) if ego => {
+                self.tracker_mut().push_wheels(time_us, pose);
+            }
+            (Content::Gyro(rate), Some(time_us)) if ego => {
+                self.tracker_mut().push_gyro(time_us, rate);
+            }
+            _ => {}
+        }
+        is_any
+    }
+
+    fn take_scan(&mut self, recorded: &Recorded, ready: &mut Ready<'_, E, N>) {
+        push_scan(self.tracker_mut(), &recorded.beams, recorded.wheels, ready);
+    }
+
+    fn end(&mut self, ready: &mut Ready<'_, E, N>) {
+        self.finish(&mut |revolution: Revolution<'_, E, N>| ready(revolution));
+    }
+
+    fn estimator(&mut self) -> &mut E {
+        self.tracker_mut().estimator_mut()
+    }
+}
+
 /// A capture on its way through a lidar's parser and an estimator.
 struct FromBytes<'a, E: Estimator<N>, const N: usize> {
     bytes: &'a [u8],
@@ -198,27 +255,10 @@ impl<E: Estimator<N>, const N: usize> WithParser for FromBytes<'_, E, N> {
             if following.is_done() {
                 break;
             }
-            let time_us = piece.time_us.map(|time_us| time_us as u32);
-            match (piece.content, time_us) {
-                (Content::Bytes(bytes), _) => {
-                    if let Some(time_us) = time_us {
-                        pipeline.set_time(time_us);
-                    }
-                    let before = following.number;
-                    pipeline.push(bytes, &mut |revolution: Revolution<'_, E, N>| {
-                        following.take(revolution.step);
-                    });
-                    if following.number > before {
-                        pipeline.tracker_mut().estimator_mut().work(BUDGET);
-                    }
-                }
-                (Content::Wheels(pose), Some(time_us)) if following.ego => {
-                    pipeline.tracker_mut().push_wheels(time_us, pose);
-                }
-                (Content::Gyro(rate), Some(time_us)) if following.ego => {
-                    pipeline.tracker_mut().push_gyro(time_us, rate);
-                }
-                _ => {}
+            let ego = following.ego;
+            let mut take = |revolution: Revolution<'_, E, N>| following.take(revolution.step);
+            if pipeline.take(&piece, ego, &mut take) {
+                pipeline.tracker_mut().estimator_mut().work(BUDGET);
             }
         }
         pipeline.finish(&mut |revolution: Revolution<'_, E, N>| following.take(revolution.step));

@@ -82,49 +82,23 @@ pub fn drive(settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
 #[must_use]
 pub fn drive_in(place: Place, settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
     let Place { world, start, way } = place;
-    let mut robot = Robot::new(start, way, settings.wheels, Noise::new(settings.seed, 1));
-    let mut noise = Noise::new(settings.seed, 2);
-    let (mut bytes, mut frames, mut moments) = (Vec::new(), Vec::new(), Vec::new());
+    let mut underway = Underway::new(start, way, settings);
     let mut clearance = f64::INFINITY;
-    let mut now = 0.0;
-    for period in 1.. {
-        if now >= settings.seconds || robot.arrived() {
-            break;
+    while underway.now < settings.seconds && !underway.robot.arrived() {
+        if underway.now >= STANDING {
+            underway.robot.steer();
         }
-        if now >= STANDING {
-            robot.steer();
-        }
-        robot.read_wheels();
-        let ends = f64::from(period) * PERIOD;
-        while sensor.next_time_us() < ends * 1e6 {
-            let mut look = |time_us: f64, bearing: f64| {
-                let time = time_us * 1e-6;
-                robot.advance(time - now);
-                now = time;
-                moments.push(Moment {
-                    time,
-                    truth: robot.pose,
-                    wheels: robot.wheels,
-                });
-                let lidar = robot.pose.then(settings.mount);
-                let range_mm = settings
-                    .ranging
-                    .measure(&world, lidar, bearing, &mut noise)?;
-                Some(Echo {
-                    range_mm,
-                    intensity: quality(Some(range_mm)),
-                })
-            };
-            let before = bytes.len();
-            sensor.fire(&mut look, &mut bytes);
-            if bytes.len() > before {
-                frames.push((bytes.len(), sensor.next_time_us()));
-            }
-        }
-        robot.advance(ends - now);
-        now = ends;
-        clearance = clearance.min(world.clearance([robot.pose.x, robot.pose.y]));
+        underway.go_on(&world, sensor);
+        let place = [underway.robot.pose.x, underway.robot.pose.y];
+        clearance = clearance.min(world.clearance(place));
     }
+    let Underway {
+        robot,
+        bytes,
+        frames,
+        moments,
+        ..
+    } = underway;
     Drive {
         world,
         bytes,
@@ -132,6 +106,83 @@ pub fn drive_in(place: Place, settings: &Settings, sensor: &mut dyn Encoder) -> 
         moments,
         distance: robot.driven,
         clearance,
+    }
+}
+
+/// A robot on its way, [`PERIOD`] by [`PERIOD`], and what came over its lidar's line so far.
+#[derive(Debug, Clone)]
+pub struct Underway {
+    /// The robot; between two periods it may be steered, or put elsewhere.
+    pub robot: Robot,
+    /// Since the start (s).
+    pub now: f64,
+    /// As in [`Drive`].
+    pub bytes: Vec<u8>,
+    /// As in [`Drive`].
+    pub frames: Vec<(usize, f64)>,
+    /// As in [`Drive`].
+    pub moments: Vec<Moment>,
+    settings: Settings,
+    noise: Noise,
+    periods: u32,
+}
+
+impl Underway {
+    /// Standing at `start`.
+    #[must_use]
+    pub fn new(start: TruePose, way: Vec<[f64; 2]>, settings: &Settings) -> Self {
+        Self {
+            robot: Robot::new(start, way, settings.wheels, Noise::new(settings.seed, 1)),
+            now: 0.0,
+            bytes: Vec::new(),
+            frames: Vec::new(),
+            moments: Vec::new(),
+            settings: settings.clone(),
+            noise: Noise::new(settings.seed, 2),
+            periods: 0,
+        }
+    }
+
+    /// Drives on for a period as it was steered, and measures the beams that fall into it.
+    pub fn go_on(&mut self, world: &World, sensor: &mut dyn Encoder) {
+        let Self {
+            robot,
+            now,
+            bytes,
+            frames,
+            moments,
+            settings,
+            noise,
+            periods,
+        } = self;
+        robot.read_wheels();
+        *periods += 1;
+        let ends = f64::from(*periods) * PERIOD;
+        while sensor.next_time_us() < ends * 1e6 {
+            let mut look = |time_us: f64, bearing: f64| {
+                let time = time_us * 1e-6;
+                robot.advance(time - *now);
+                *now = time;
+                moments.push(Moment {
+                    time,
+                    truth: robot.pose,
+                    wheels: robot.wheels,
+                });
+                let lidar = robot.pose.then(settings.mount);
+                let range_mm = settings.ranging.measure(world, lidar, bearing, noise)?;
+                Some(Echo {
+                    range_mm,
+                    intensity: quality(Some(range_mm)),
+                })
+            };
+            let before = bytes.len();
+            sensor.fire(&mut look, bytes);
+            if bytes.len() > before {
+                frames.push((bytes.len(), sensor.next_time_us()));
+            }
+        }
+        robot.advance(ends - *now);
+        *now = ends;
     }
 }
 

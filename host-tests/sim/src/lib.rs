@@ -28,7 +28,7 @@ pub mod wheels;
 pub mod world;
 
 pub use course::Course;
-pub use drive::{Drive, Moment, Settings, drive, drive_in};
+pub use drive::{Drive, Moment, Settings, Underway, drive, drive_in};
 pub use lidar::{Ranging, Still};
 pub use noise::Noise;
 pub use place::Place;

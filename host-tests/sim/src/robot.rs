@@ -105,6 +105,11 @@ impl Robot {
             }
             break;
         }
+        self.aim(speed, turn);
+    }
+
+    /// Drives towards a speed (m/s) and a rate of turn (rad/s) in the next [`PERIOD`], as fast as it accelerates.
+    pub fn aim(&mut self, speed: f64, turn: f64) {
         self.speed += (speed - self.speed).clamp(-ACCELERATION * PERIOD, ACCELERATION * PERIOD);
         self.turn +=
             (turn - self.turn).clamp(-TURN_ACCELERATION * PERIOD, TURN_ACCELERATION * PERIOD);

@@ -87,7 +87,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let model = decode::model(&args.lidar, &[])?;
     fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     let settings = Settings {
-        ranging: self::settings(model).ranging,
+        ranging: simulated::settings(model).ranging,
         ..settings
     };
     let driven = drive(place(args)?, &settings, model)?;
@@ -95,18 +95,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     fs::write(&path, &driven.bytes).with_context(|| path.display().to_string())?;
     let size = driven.size();
     sized!(size, turning(args, &settings, driven))
-}
-
-/// The default drive with a lidar that ranges as `model` does.
-pub fn settings(model: &Model) -> Settings {
-    Settings {
-        ranging: Ranging {
-            nearest: f64::from(model.min_range_mm) * 1e-3,
-            farthest: f64::from(model.max_range_mm) * 1e-3,
-            ..Ranging::DEFAULT
-        },
-        ..Settings::DEFAULT
-    }
 }
 
 /// Drives through a place with a lidar of `model`.

@@ -10,6 +10,7 @@ use beamfix::scan::Mount;
 use beamfix_sim::Settings;
 use beamfix_sim::place::{self, Place};
 use host_tests::decode;
+use host_tests::formats::capture::simulated;
 use host_tests::pipeline::{config, follow};
 use host_tests::report::scene::Outcome;
 use host_tests::sized;
@@ -98,7 +99,7 @@ fn one(args: &Args, name: &str, seed: u64, model: &'static Model) -> Result<Outc
     let settings = Settings {
         seed,
         seconds: args.seconds,
-        ..simulate::settings(model)
+        ..simulated::settings(model)
     };
     let place = Place::named(name, seed).context("a built-in place")?;
     let driven = simulate::drive(place, &settings, model)?;

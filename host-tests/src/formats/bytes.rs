@@ -39,11 +39,16 @@ pub fn load_at_most(path: &Path, most: u64) -> Result<Content> {
     File::open(path)
         .and_then(|file| file.take(most + 1).read_to_end(&mut raw))
         .with_context(|| name.to_string())?;
-    ensure!(!raw.is_empty(), "{name}: the file is empty");
     ensure!(
         raw.len() as u64 <= most,
         "{name}: more than {most} bytes, which no such file has"
     );
+    unpack(&name.to_string(), raw)
+}
+
+/// [`load`] for the bytes of a file that is called so.
+pub fn unpack(name: &str, raw: Vec<u8>) -> Result<Content> {
+    ensure!(!raw.is_empty(), "{name}: the file is empty");
     let mut content = Content::default();
     let most = MAX_UNPACKED + MAX_RATIO * raw.len() as u64;
     let (kind, unpacked) = if raw.starts_with(&GZIP) {
@@ -53,7 +58,7 @@ pub fn load_at_most(path: &Path, most: u64) -> Result<Content> {
             archive.take(most + 1).read_to_end(&mut content.bytes),
         )
     } else if raw.starts_with(&ZSTD) {
-        let archive = zstd::Decoder::new(&raw[..]).with_context(|| name.to_string())?;
+        let archive = unzstd(&raw).with_context(|| name.to_owned())?;
         (
             "zstd",
             archive.take(most + 1).read_to_end(&mut content.bytes),
@@ -77,4 +82,16 @@ pub fn load_at_most(path: &Path, most: u64) -> Result<Content> {
         ));
     }
     Ok(content)
+}
+
+/// What a zstd frame holds.
+#[cfg(not(target_family = "wasm"))]
+pub fn unzstd(packed: &[u8]) -> Result<impl Read> {
+    Ok(zstd::Decoder::new(packed)?)
+}
+
+/// What a zstd frame holds: nothing, as the library for it is of C.
+#[cfg(target_family = "wasm")]
+pub fn unzstd(_: &[u8]) -> Result<std::io::Empty> {
+    bail!("packed with zstd, which is not read in a browser: unpack it")
 }

@@ -84,6 +84,11 @@ impl<W: Write> Recorder<W> {
         self.output.write_all(&payload)
     }
 
+    /// What was written so far.
+    pub fn written(&self) -> &W {
+        &self.output
+    }
+
     /// Hands on what was pushed so far.
     pub fn flush(&mut self) -> io::Result<()> {
         self.output.flush()

@@ -12,7 +12,8 @@ use crate::pipeline::Pipeline;
 use crate::{size, sized};
 
 /// The order in which the elements of a scan's array were measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(not(target_family = "wasm"), derive(clap::ValueEnum))]
 pub enum Order {
     /// The first element first.
     InOrder,

@@ -184,16 +184,8 @@ pub fn of_world(
         Pose::new(low[0] as f32, low[1] as f32, 0.0),
     )?;
     let mut map = Map::new(shape, vec![occupancy::UNKNOWN; shape.len()])?;
-    // A face between two cells takes both: the floor must not leak through.
-    let half = 0.5001 * f64::from(resolution);
-    for y in 0..i32::from(shape.height()) {
-        for x in 0..i32::from(shape.width()) {
-            let middle = shape.middle_of(x, y);
-            if world.clearance([f64::from(middle.x), f64::from(middle.y)]) <= half {
-                *map.get_mut(x, y).expect("on the map") = occupancy::OCCUPIED;
-            }
-        }
-    }
+    let sides = [shape.width(), shape.height()].map(i32::from);
+    occupy(world, &mut map, [0, 0], sides);
     let start = shape.cell_of(beamfix::geometry::Point::new(
         inside[0] as f32,
         inside[1] as f32,
@@ -210,6 +202,44 @@ pub fn of_world(
         open.extend([(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]);
     }
     Ok(map)
+}
+
+/// Makes the cells of a part occupied that a face crosses: the part from the cell `low` on, of so many columns and rows.
+/// A part that no face is near is left out as a whole.
+fn occupy(world: &World, map: &mut Map, low: [i32; 2], sides: [i32; 2]) {
+    let shape = *map.shape();
+    let [columns, rows] = sides;
+    let [first, last] = [low, [low[0] + columns - 1, low[1] + rows - 1]].map(|[x, y]| {
+        let middle = shape.middle_of(x, y);
+        [f64::from(middle.x), f64::from(middle.y)]
+    });
+    // A face between two cells takes both: the floor must not leak through.
+    let half = 0.5001 * f64::from(shape.resolution());
+    let middle = [0, 1].map(|k| 0.5 * (first[k] + last[k]));
+    let around = 0.5 * libm::hypot(last[0] - first[0], last[1] - first[1]);
+    // Rounding to f32 moves middles of cells by far less than a twentieth of one.
+    if world.clearance(middle) > around + 1.1 * half {
+        return;
+    }
+    if columns == 1 && rows == 1 {
+        if world.clearance(middle) <= half {
+            *map.get_mut(low[0], low[1]).expect("on the map") = occupancy::OCCUPIED;
+        }
+        return;
+    }
+    let is_wide = columns >= rows;
+    let (left, right) = if is_wide {
+        ([columns / 2, rows], [columns - columns / 2, rows])
+    } else {
+        ([columns, rows / 2], [columns, rows - rows / 2])
+    };
+    let next = if is_wide {
+        [low[0] + left[0], low[1]]
+    } else {
+        [low[0], low[1] + left[1]]
+    };
+    occupy(world, map, low, left);
+    occupy(world, map, next, right);
 }
 
 #[cfg(test)]

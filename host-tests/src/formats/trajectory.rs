@@ -5,7 +5,8 @@ use std::io::{self, Write};
 use beamfix::geometry::Pose;
 
 /// How a trajectory is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(not(target_family = "wasm"), derive(clap::ValueEnum))]
 pub enum Format {
     /// `timestamp x y theta` (s, m, m, rad); ` # guess` follows a pose that no match confirms.
     #[default]

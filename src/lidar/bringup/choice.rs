@@ -14,7 +14,7 @@ pub trait WithParser {
     type Output;
 
     /// Does it with a parser of the model's family.
-    fn run<P: Protocol>(self, parser: P) -> Self::Output;
+    fn run<P: Protocol + 'static>(self, parser: P) -> Self::Output;
 }
 
 /// Does something with the parser of `model`.

@@ -3,13 +3,26 @@
 use anyhow::Result;
 use beamfix::lidar::Model;
 use beamfix::scan::{Beam, Mount};
+use beamfix_sim::lidar::Ranging;
 use beamfix_sim::ring::Ring;
-use beamfix_sim::{Drive, Moment, TruePose};
+use beamfix_sim::{Drive, Moment, Settings, TruePose};
 
 use super::log::{self, Revolution};
 use super::{Content, Recorder};
 use crate::decode::Summary;
 use crate::formats::{Log, Recorded};
+
+/// The default drive with a lidar that ranges as `model` does.
+pub fn settings(model: &Model) -> Settings {
+    Settings {
+        ranging: Ranging {
+            nearest: f64::from(model.min_range_mm) * 1e-3,
+            farthest: f64::from(model.max_range_mm) * 1e-3,
+            ..Ranging::DEFAULT
+        },
+        ..Settings::DEFAULT
+    }
+}
 
 /// Pieces before the first bytes.
 const HEAD: usize = 2;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, anyhow, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
@@ -217,7 +217,15 @@ impl Bag {
         Ok(())
     }
 
+    #[cfg(target_family = "wasm")]
+    fn take_sqlite(&mut self, _: Vec<u8>) -> Result<()> {
+        bail!(
+            "an SQLite file, which is not read in a browser: `ros2 bag convert` makes an MCAP file of it"
+        )
+    }
+
     /// rosbag2's tables: `topics(id, name, type, …)` and `messages(topic_id, timestamp, data)`.
+    #[cfg(not(target_family = "wasm"))]
     fn take_sqlite(&mut self, mut file: Vec<u8>) -> Result<()> {
         // A database with a write-ahead log opens only beside it; what is in this file is whole without.
         if let Some(versions) = file.get_mut(18..20) {
@@ -247,7 +255,7 @@ impl Bag {
             };
             let time: i64 = row.get(1)?;
             let data = row.get_ref(2)?;
-            let data = data.as_blob().map_err(|error| anyhow!("{error}"))?;
+            let data = data.as_blob().map_err(|error| anyhow::anyhow!("{error}"))?;
             self.keep(topic, time.unsigned_abs(), data)?;
         }
         Ok(())
@@ -261,7 +269,7 @@ fn unpacked(data: &[u8]) -> Result<Vec<u8>> {
     }
     let mut message = Vec::new();
     let most = MAX_RECORD as u64;
-    zstd::Decoder::new(data)?
+    bytes::unzstd(data)?
         .take(most + 1)
         .read_to_end(&mut message)
         .context("a packed message")?;

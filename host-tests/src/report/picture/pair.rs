@@ -10,8 +10,8 @@ use plotters::prelude::*;
 
 use super::axes::{bounds, dots, ellipse, header, line, metres};
 use super::{Drawing, colour};
+use crate::matcher::{correspondence, metres_of};
 use crate::report::score::{error, quantile};
-use beamfix_sim::TruePose;
 
 /// A current point in the reference's frame, with the place on the reference's line that it is drawn to.
 #[derive(Debug, Clone, Copy)]
@@ -336,37 +336,13 @@ impl Drawing for Frame<'_> {
     }
 }
 
-/// Places a point with `pose` and finds its correspondence as the matcher does: the line that the reference saw in
-/// that direction, unless the weighted distance is beyond the gate.
+/// A point at `pose`, with its correspondence.
 fn placed<const N: usize>(
     lines: &Reference<N>,
     pose: Pose,
     point: &ScanPoint,
     gate: f64,
 ) -> Placed {
-    let [x, y] = metres_of(point.x, point.y);
-    let at = TruePose::from(pose).then(TruePose::new(x, y, 0.0));
-    let turn = libm::atan2(at.y, at.x) / core::f64::consts::TAU + 1.0;
-    let index = (turn * N as f64 + 0.5) as usize % N.max(1);
-    let foot = lines
-        .lines()
-        .get(index)
-        .filter(|line| line.is_some())
-        .and_then(|line| {
-            let (mx, my) = (f64::from(line.mx), f64::from(line.my));
-            let [qx, qy] = metres_of(line.qx, line.qy);
-            let (dx, dy) = (at.x - qx, at.y - qy);
-            let weighted_mm = (mx * dx + my * dy) / 1024.0 * 1000.0;
-            let along = (mx * dx + my * dy) / (mx * mx + my * my);
-            let near = dx.abs() < 8.0 && dy.abs() < 8.0;
-            (near && weighted_mm.abs() < gate).then_some([at.x - along * mx, at.y - along * my])
-        });
-    Placed {
-        at: [at.x, at.y],
-        foot,
-    }
-}
-
-fn metres_of(x: i16, y: i16) -> [f64; 2] {
-    [f64::from(x) * 1e-3, f64::from(y) * 1e-3]
+    let (at, foot) = correspondence(lines, pose, point, gate);
+    Placed { at, foot }
 }
