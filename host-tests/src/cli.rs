@@ -6,6 +6,7 @@ mod decode;
 mod field;
 mod learn;
 mod lidars;
+mod live;
 mod output;
 mod pairs;
 mod prior;
@@ -47,6 +48,7 @@ enum Command {
     Field(field::Args),
     Learn(learn::Args),
     Lidars(lidars::Args),
+    Live(live::Args),
     Bench(bench::Args),
     Card(card::Args),
     Prune(prune::Args),
@@ -69,6 +71,7 @@ pub fn run() -> ExitCode {
         Some(Command::Field(args)) => field::run(&args),
         Some(Command::Learn(args)) => learn::run(&args),
         Some(Command::Lidars(args)) => lidars::run(&args),
+        Some(Command::Live(args)) => live::run(&args),
         Some(Command::Regress(args)) => regress::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Pairs(args)) => pairs::run(&args),

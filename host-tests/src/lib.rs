@@ -2,6 +2,8 @@
 
 #[cfg(not(target_family = "wasm"))]
 pub mod board;
+#[cfg(not(target_family = "wasm"))]
+pub mod bringup;
 pub mod decode;
 pub mod formats;
 #[cfg(not(target_family = "wasm"))]

@@ -2,6 +2,7 @@
 //!
 //! A reference keeps a line for each of N directions, so N is best what the lidar measures in a revolution.
 
+use beamfix::lidar::Model;
 use beamfix::scan::Beam;
 
 /// Beams a revolution, smallest first.
@@ -45,6 +46,16 @@ pub fn fitting<'a>(scans: impl Iterator<Item = &'a [Beam]>) -> usize {
         .into_iter()
         .find(|&size| size >= needed)
         .unwrap_or(largest)
+}
+
+/// What [`fitting`] gives for scans of this lidar at its usual speed; more than the largest of [`SIZES`] where none has room.
+#[must_use]
+pub fn of_model(model: &Model) -> usize {
+    let beams = (10 * model.points_per_s / u32::from(model.revolutions_per_10s.max(1))) as usize;
+    SIZES
+        .into_iter()
+        .find(|&size| size >= beams)
+        .unwrap_or(beams)
 }
 
 /// Beams that a revolution would have, by the median step between two of a scan.

@@ -1,6 +1,6 @@
 //! A simulated robot that is driven by hand, and what comes over its lines.
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, ensure};
 use beamfix::lidar::Model;
 use beamfix_sim::encoder::{self, Encoder};
 use beamfix_sim::place::Place;
@@ -8,7 +8,7 @@ use beamfix_sim::robot::PERIOD;
 use beamfix_sim::{Noise, Settings, TruePose, Underway, World};
 use host_tests::decode;
 use host_tests::formats::capture::{Content, Recorder, simulated};
-use host_tests::size::SIZES;
+use host_tests::size;
 
 use crate::twin::BEAMS;
 
@@ -38,7 +38,9 @@ pub fn beams(model: &Model) -> usize {
 
 /// The lidars whose revolutions fit whole.
 pub fn lidars() -> impl Iterator<Item = &'static Model> {
-    Model::ALL.iter().filter(|model| beams(model) <= BEAMS)
+    Model::ALL
+        .iter()
+        .filter(|model| size::of_model(model) <= BEAMS)
 }
 
 impl Live {
@@ -54,17 +56,26 @@ impl Live {
             },
             Ok,
         )?;
+        let settings = simulated::settings(model);
         let settings = Settings {
             seed,
-            ..simulated::settings(model)
+            ranging: place.nature.ranging(settings.ranging),
+            wheels: place.nature.wheels(settings.wheels),
+            ..settings
         };
+        let mut sensor = encoder::for_model(model);
+        ensure!(
+            sensor.sway(place.nature.sway),
+            "the simulated {} turns steadily",
+            model.name
+        );
         let mut recorder = Recorder::new(Vec::new())?;
         recorder.push(0, Content::Lidar(model.name))?;
         recorder.push(0, Content::Mount(settings.mount.into()))?;
         Ok(Self {
             underway: Underway::new(place.start, Vec::new(), &settings),
             world: place.world,
-            sensor: encoder::for_model(model),
+            sensor,
             model,
             settings,
             recorder,
@@ -72,15 +83,6 @@ impl Live {
             periods: 0,
             left: 0.0,
         })
-    }
-
-    /// Directions of the odometry, as the tool takes them for a recording of this lidar.
-    pub fn directions(&self) -> usize {
-        let needed = beams(self.model);
-        SIZES
-            .into_iter()
-            .find(|&size| size >= needed)
-            .unwrap_or(BEAMS)
     }
 
     /// Drives on; `take` gets what comes over the lines, with its time (µs).

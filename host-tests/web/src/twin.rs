@@ -20,6 +20,7 @@ use host_tests::formats::field::of_map;
 use host_tests::formats::ros_map;
 use host_tests::pipeline::{Pieces, config};
 use host_tests::report::hash::PoseHash;
+use host_tests::size;
 
 use crate::live::Live;
 use crate::replay::{Next, Replay};
@@ -137,7 +138,7 @@ impl Twin {
 
     fn new(source: Source, model: &Model, mount: Mount, start: TruePose) -> Self {
         let directions = match &source {
-            Source::Live(live) => live.directions(),
+            Source::Live(live) => size::of_model(live.model),
             Source::Replay(replay) => replay.directions,
         };
         let mapper = Mapping::new(config(mount, directions), SlamConfig::DEFAULT);

@@ -265,7 +265,7 @@ impl Leave {
 }
 
 /// `x,y,degrees` or `x,y,degrees,down`.
-fn mount(text: &str) -> Result<Mount> {
+pub fn mount(text: &str) -> Result<Mount> {
     let place = text.strip_suffix(",down");
     Ok(Mount {
         robot_from_lidar: pose(place.unwrap_or(text))?,

@@ -1,0 +1,140 @@
+//! `live`: simulated lidars at the other end of a pseudo-terminal, as if they were plugged in.
+
+use std::io::{ErrorKind, Read, Write};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use beamfix::lidar::Model;
+use beamfix_sim::drive::{Settings, drive};
+use beamfix_sim::encoder;
+use serialport::{SerialPort, TTYPort};
+
+use crate::common::tool::{beamfix, folder, json, text};
+
+/// What a sensor is asked, and answers.
+struct Answers<'a> {
+    /// A request's bytes, and what the sensor sends for it.
+    answers: &'a [(&'a [u8], &'a [u8])],
+    /// The request after which it measures; none: it measures from the start.
+    scan: Option<&'a [u8]>,
+}
+
+/// Plays a lidar until nobody listens any more: answers, and sends what it measures at its own pace. Gives the requests.
+fn play(mut line: TTYPort, model: &'static Model, answers: &Answers<'_>) -> Vec<u8> {
+    let settings = Settings {
+        seconds: 40.0,
+        ..Settings::DEFAULT
+    };
+    let measured = drive(&settings, encoder::for_model(model).as_mut());
+    line.set_timeout(Duration::from_millis(1)).expect("a line");
+    let (mut asked, mut answered) = (Vec::new(), 0);
+    let mut began = answers.scan.is_none().then(Instant::now);
+    let (mut sent, mut frame) = (0, 0);
+    let start = Instant::now();
+    while start.elapsed() < Duration::from_secs(60) {
+        let mut bytes = [0; 256];
+        match line.read(&mut bytes) {
+            Ok(n) => asked.extend_from_slice(&bytes[..n]),
+            Err(error) if error.kind() == ErrorKind::TimedOut => {}
+            // Whoever listened has closed the line.
+            Err(_) => break,
+        }
+        for (request, answer) in answers.answers {
+            if asked[answered..].ends_with(request) {
+                answered = asked.len();
+                line.write_all(answer).expect("somebody listens");
+            }
+        }
+        if answers.scan.is_some_and(|scan| asked.ends_with(scan)) {
+            began.get_or_insert_with(Instant::now);
+        }
+        let now_us = began.map_or(0.0, |began| began.elapsed().as_secs_f64() * 1e6);
+        while let Some(&(end, _)) = measured.frames.get(frame).filter(|next| next.1 < now_us) {
+            if line.write_all(&measured.bytes[sent..end]).is_err() {
+                return asked;
+            }
+            (sent, frame) = (end, frame + 1);
+        }
+    }
+    asked
+}
+
+/// Follows a lidar that is played; gives what the tool said, what it was asked, and what it said about the lidar.
+fn follow(
+    model: &'static Model,
+    name: &str,
+    answers: &'static Answers<'static>,
+) -> (serde_json::Value, Vec<u8>, String) {
+    let (master, slave) = TTYPort::pair().expect("a pseudo-terminal");
+    let path = slave.name().expect("its name");
+    let recording = folder("live").join(format!("{}-{name}.rec", model.name));
+    let lidar = thread::spawn(move || play(master, model, answers));
+    let output = beamfix(&[
+        "live",
+        &path,
+        "--lidar",
+        name,
+        "--scans",
+        "25",
+        "--record",
+        text(&recording),
+        "--json",
+    ]);
+    let said = json(&output);
+    drop(slave);
+    let asked = lidar.join().expect("the lidar");
+    // What was recorded gives the same poses again.
+    let replayed = json(&beamfix(&[
+        "replay",
+        text(&recording),
+        "--scans",
+        "25",
+        "--json",
+    ]));
+    assert_eq!(
+        said["pose_hash"], replayed["pose_hash"],
+        "{said} {replayed}"
+    );
+    (
+        said,
+        asked,
+        String::from_utf8_lossy(&output.stderr).into_owned(),
+    )
+}
+
+#[test]
+fn a_lidar_that_sends_by_itself_is_heard_named_and_followed() {
+    static NONE: Answers<'static> = Answers {
+        answers: &[],
+        scan: None,
+    };
+    let (said, _, lines) = follow(&Model::LDROBOT_LD06, "auto", &NONE);
+    assert!(lines.contains("ld06 at"), "{lines}");
+    assert_eq!(said["scans"], 25);
+    assert_eq!(said["refused"], 0, "{said}");
+    // No terminal: a line now and then.
+    assert!(lines.contains("scans, 0 refused"), "{lines}");
+}
+
+#[test]
+fn a_lidar_that_waits_for_a_command_gets_it() {
+    // HLS-LDS01: the letter b.
+    static STARTED: Answers<'static> = Answers {
+        answers: &[],
+        scan: Some(b"b"),
+    };
+    let (said, asked, _) = follow(&Model::HLS_LDS01, "lds01", &STARTED);
+    assert_eq!(asked, b"b");
+    assert_eq!(said["scans"], 25);
+    assert_eq!(said["refused"], 0, "{said}");
+}
+
+#[test]
+fn a_silent_line_is_told() {
+    let (_master, slave) = TTYPort::pair().expect("a pseudo-terminal");
+    let path = slave.name().expect("its name");
+    let output = beamfix(&["live", &path, "--lidar", "ld06", "--timeout", "0.5"]);
+    assert_eq!(output.status.code(), Some(2));
+    let lines = String::from_utf8_lossy(&output.stderr);
+    assert!(lines.contains("no revolution for 0.5 s"), "{lines}");
+}
