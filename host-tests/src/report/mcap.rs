@@ -153,13 +153,7 @@ impl McapFile {
 
     fn write(&mut self, channel_id: u16, seconds: f64, message: &Value) -> Result<()> {
         let time = (seconds * 1e9) as u64;
-        let header = MessageHeader {
-            channel_id,
-            sequence: self.sequence,
-            log_time: time,
-            publish_time: time,
-        };
-        self.sequence += 1;
+        let header = next_header(channel_id, &mut self.sequence, time);
         let bytes = message.to_string();
         self.writer
             .write_to_known_channel(&header, bytes.as_bytes())
@@ -253,4 +247,16 @@ fn grid_schema() -> Value {
             "fields": {"type": "array", "items": field}, "data": {"type": "string", "contentEncoding": "base64"},
         }),
     )
+}
+
+/// The header of the next message of a file (ns).
+pub(super) fn next_header(channel_id: u16, sequence: &mut u32, time: u64) -> MessageHeader {
+    let header = MessageHeader {
+        channel_id,
+        sequence: *sequence,
+        log_time: time,
+        publish_time: time,
+    };
+    *sequence += 1;
+    header
 }

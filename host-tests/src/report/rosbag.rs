@@ -14,7 +14,6 @@ use anyhow::{Context, Result, anyhow};
 use beamfix::geometry::Pose;
 use beamfix::grid::occupancy::{self, Cell};
 use beamfix::scan::{Mount, NoReturn};
-use mcap::records::MessageHeader;
 use serde::Serialize;
 
 use self::message::{
@@ -23,6 +22,7 @@ use self::message::{
 use self::sweep::Sweep;
 use crate::formats::Recorded;
 use crate::formats::ros_map::Map;
+use crate::report::mcap::next_header;
 use crate::report::track::At;
 
 const MAP: &str = "map";
@@ -69,8 +69,8 @@ pub struct RosBag {
     sequence: u32,
     mount: Mount,
     sweep: Sweep,
-    /// Whether a beam's time is not the one that its place in the array says.
-    is_time_moved: bool,
+    /// Largest distance of a beam's time from the one that its place in the array says (us).
+    time_shift_us: u32,
     /// Time of the first beam of the last scan: microseconds of 32 bits, and without their overflow (us).
     clock: Option<(u32, u64)>,
     /// When the first and the last message were written (ns).
@@ -103,7 +103,7 @@ impl RosBag {
             sequence: 0,
             mount,
             sweep: Sweep::default(),
-            is_time_moved: false,
+            time_shift_us: 0,
             clock: None,
             span: None,
         })
@@ -113,9 +113,13 @@ impl RosBag {
     #[must_use]
     pub fn moved(&self) -> Option<String> {
         let degrees = self.sweep.largest_shift().to_degrees();
-        let what = match (degrees > 0.0, self.is_time_moved) {
-            (true, _) => format!("bearings are moved by up to {degrees:.2}°"),
-            (false, true) => "times of beams are moved by microseconds".into(),
+        let milliseconds = f64::from(self.time_shift_us) * 1e-3;
+        let what = match (degrees > 0.0, self.time_shift_us > 0) {
+            (true, false) => format!("bearings are moved by up to {degrees:.2}°"),
+            (true, true) => format!(
+                "bearings are moved by up to {degrees:.2}° and times of beams by up to {milliseconds:.3} ms"
+            ),
+            (false, true) => format!("times of beams are moved by up to {milliseconds:.3} ms"),
             (false, false) => return None,
         };
         Some(format!(
@@ -151,10 +155,11 @@ impl RosBag {
         } else {
             (sweep_us as f32 + 0.5) * 1e-6 / gaps
         };
-        self.is_time_moved |= scan.beams.iter().enumerate().any(|(k, beam)| {
-            let us = f64::from(time_increment) * 1e6 * k as f64;
-            beam.time_us.wrapping_sub(first.time_us) != us as u32
-        });
+        for (k, beam) in scan.beams.iter().enumerate() {
+            let us = (f64::from(time_increment) * 1e6 * k as f64) as u32;
+            let shift = beam.time_us.wrapping_sub(first.time_us).wrapping_sub(us);
+            self.time_shift_us = self.time_shift_us.max(shift.cast_signed().unsigned_abs());
+        }
         let range = |beam: &beamfix::scan::Beam| match beam.range.mm() {
             Ok(mm) => f32::from(mm) * 1e-3,
             Err(NoReturn::TooNear) => f32::NEG_INFINITY,
@@ -263,13 +268,7 @@ impl RosBag {
         let mut bytes = vec![0, 1, 0, 0];
         let body = cdr_encoding::to_vec::<_, byteorder::LittleEndian>(message);
         bytes.extend(body.map_err(|error| anyhow!("{}: {error}", topic.name))?);
-        let header = MessageHeader {
-            channel_id,
-            sequence: self.sequence,
-            log_time: time,
-            publish_time: time,
-        };
-        self.sequence += 1;
+        let header = next_header(channel_id, &mut self.sequence, time);
         self.span = Some((self.span.map_or(time, |(first, _)| first), time));
         self.writer.write_to_known_channel(&header, &bytes)?;
         Ok(())

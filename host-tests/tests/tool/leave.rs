@@ -132,3 +132,16 @@ fn one_command_leaves_all_of_it_in_every_world_and_for_every_log() {
     }
     println!("{logs} logs replayed");
 }
+
+#[test]
+fn a_ring_of_rangers_has_the_same_poses_from_its_log_and_from_its_bag() {
+    let folder = folder("leave-ring");
+    let simulated = ["--lidar", "vl53l5cx-ring", "--seconds", "20", "--json"];
+    let as_bag = ["--recording-format", "ros2", "--out", text(&folder)];
+    let run = json(&beamfix(&[&["simulate"], &simulated[..], &as_bag].concat()));
+    for name in ["ring.log", "bag"] {
+        let path = folder.join(name);
+        let replayed = json(&beamfix(&["replay", text(&path), "--json"]));
+        assert_eq!(run["pose_hash"], replayed["pose_hash"], "{name}");
+    }
+}

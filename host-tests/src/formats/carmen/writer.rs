@@ -10,8 +10,8 @@ use crate::formats::Log;
 /// Longest range that is written (m); a beam without a return gets it.
 const MAX_RANGE: f64 = 65.535;
 
-/// The scans as `ROBOTLASER1` lines, their beams evenly spread over a full turn, counter-clockwise from straight ahead; ranges
-/// to a millimetre.
+/// The scans as `ROBOTLASER1` lines, their beams evenly spread over a full turn, counter-clockwise from the first one's bearing;
+/// ranges to a millimetre.
 #[must_use]
 pub fn written(log: &Log) -> String {
     let mut text = String::from("# ROBOTLASER1 lines as CARMEN writes them\n");
@@ -19,9 +19,11 @@ pub fn written(log: &Log) -> String {
     for scan in &log.scans {
         let count = scan.beams.len();
         let step = TAU / count.max(1) as f64;
+        let first = scan.beams.first().map_or(0, |beam| beam.bearing.0 as i16);
+        let first = f64::from(first) / 65_536.0 * TAU;
         let _ = write!(
             text,
-            "ROBOTLASER1 0 0 {} {step} {MAX_RANGE} 0.01 0 {count}",
+            "ROBOTLASER1 0 {first} {} {step} {MAX_RANGE} 0.01 0 {count}",
             TAU - step
         );
         for beam in &scan.beams {

@@ -115,11 +115,24 @@ impl PairPicture {
         }
     }
 
-    /// The guess and the estimate after each pass, one picture each, for an animation.
+    /// The guess and the estimates after the passes, one picture each, for an animation: those that moved the scan by so much
+    /// that one sees it, and the last.
     #[must_use]
     pub fn frames(&self) -> Vec<Frame<'_>> {
+        /// A fifth of a pixel where a picture is ten metres wide (m), and as much five metres away (rad).
+        const SEEN: (f32, f32) = (0.003, 0.0006);
+        let mut shown = self.guess;
+        let mut passes = vec![0];
+        for (pass, &pose) in (1..self.passes.len()).zip(&self.path) {
+            let motion = shown.between(pose);
+            let is_last = pass + 1 == self.passes.len();
+            if is_last || motion.distance() > SEEN.0 || motion.theta.abs() > SEEN.1 {
+                passes.push(pass);
+                shown = pose;
+            }
+        }
         let frame = |pass| Frame { pair: self, pass };
-        (0..self.passes.len()).map(frame).collect()
+        passes.into_iter().map(frame).collect()
     }
 
     fn scans<B: DrawingBackend>(
