@@ -87,6 +87,7 @@ impl Course {
             scale: [0.0; 2],
             noise: 0.0,
             slips_per_s: 0.0,
+            ..WheelErrors::DEFAULT
         };
         let from = self.last();
         let mut robot = Robot::new(from.truth, corners.to_vec(), ideal, Noise::new(0, 0));

@@ -2,8 +2,8 @@
 
 use super::lidar::{Ranging, quality};
 use super::noise::Noise;
-use super::place::Place;
-use super::pose::TruePose;
+use super::place::{Nature, Place};
+use super::pose::{TruePose, wrap};
 use super::robot::{PERIOD, Robot, WheelErrors};
 use super::scenes;
 use super::world::World;
@@ -61,6 +61,10 @@ pub struct Drive {
     pub distance: f64,
     /// Nearest that the robot's middle came to anything (m).
     pub clearance: f64,
+    /// What robot and lidar were like.
+    pub nature: Nature,
+    /// When (s) the gyroscope told which rate of turn (rad/s).
+    pub gyro: Vec<(f64, f64)>,
 }
 
 /// The robot stands that long before it drives off (s): its first scan is not bent by any motion.
@@ -74,6 +78,7 @@ pub fn drive(settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
         world: scenes::flat(),
         start,
         way,
+        ..Place::default()
     };
     drive_in(flat, settings, sensor)
 }
@@ -81,14 +86,42 @@ pub fn drive(settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
 /// Drives the way of a place with `sensor` on board.
 #[must_use]
 pub fn drive_in(place: Place, settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
-    let Place { world, start, way } = place;
-    let mut underway = Underway::new(start, way, settings);
+    let Place {
+        mut world,
+        start,
+        way,
+        nature,
+        moving,
+    } = place;
+    let settings = Settings {
+        ranging: nature.ranging(settings.ranging),
+        wheels: nature.wheels(settings.wheels),
+        ..settings.clone()
+    };
+    sensor.sway(nature.sway);
+    let mut underway = Underway::new(start, way, &settings);
+    underway.robot = underway.robot.with_steering(nature.steering);
+    let mut noise = Noise::new(settings.seed, 4);
+    let mut gyro = Vec::new();
     let mut clearance = f64::INFINITY;
     while underway.now < settings.seconds && !underway.robot.arrived() {
         if underway.now >= STANDING {
             underway.robot.steer();
         }
+        moving.place(underway.now, &mut world);
+        if let Some([seconds, turn]) = nature.knock
+            && underway.now >= seconds
+        {
+            underway.settings.mount.theta = settings.mount.theta + turn;
+        }
+        let heading = underway.robot.pose.theta;
         underway.go_on(&world, sensor);
+        if let Some([bias, sigma]) = nature.gyro {
+            let turned = wrap(underway.robot.pose.theta - heading);
+            let rate = turned / PERIOD + bias + noise.normal(sigma);
+            // Of the middle of the period, as the mean is.
+            gyro.push((underway.now - 0.5 * PERIOD, rate));
+        }
         let place = [underway.robot.pose.x, underway.robot.pose.y];
         clearance = clearance.min(world.clearance(place));
     }
@@ -106,6 +139,8 @@ pub fn drive_in(place: Place, settings: &Settings, sensor: &mut dyn Encoder) -> 
         moments,
         distance: robot.driven,
         clearance,
+        nature,
+        gyro,
     }
 }
 

@@ -38,6 +38,11 @@ pub trait Encoder {
     ///
     /// `look` says what lies, at a time (µs), in a direction (radians, counter-clockwise from the sensor's front).
     fn fire(&mut self, look: &mut dyn FnMut(f64, f64) -> Option<Echo>, line: &mut Vec<u8>);
+
+    /// Lets the motor be faster and slower by a share of its speed; false where the simulated sensor turns steadily only.
+    fn sway(&mut self, share: f64) -> bool {
+        share == 0.0
+    }
 }
 
 /// The simulated sensor of a model.

@@ -11,14 +11,30 @@
 //! #Sa#
 //! ####
 //! end
+//! glass 0 0  1 0              a face of glass; mirror and black are others
+//! rectangle 5 4               walls around the middle, so long and so wide
 //! start 0.5 0.5  90
 //! way 1 1  2 3                corners of the robot's way, in any number of lines
+//! drive omni                  it rolls to all sides; ackermann 0.6: it drives no smaller circle
+//! door 1 0  2 0  5 8          a leaf from its hinge to its edge, which opens by a quarter turn from 5 s to 8 s
+//! person 1 2  90 0.8          somebody who walks on from there (degrees, m/s)
+//! wheels 7                    the wheels tell where they are so many times a second, not with each revolution
+//! gyro 0.5 0.2                a gyroscope with so much bias and noise (deg/s), a hundred times a second
+//! knock 10 5                  after 10 s the lidar sits turned by 5 degrees in its mount
+//! slip 2  30 100              so many slips a second, each by 30 to 100 % of what a wheel rolls
+//! lidar bias 0.02             what the lidar gets wrong: ranges are too long (m), noise by range (share of it),
+//! lidar distance 0.01         and where a face is grazed, the width of a beam (degrees), which mixes what lies at an edge,
+//! lidar grazing 1             and the motor's speed, which sways by a share of it
+//! lidar width 0.3
+//! lidar sway 0.05
 //! ```
 
+use crate::lidar::Ranging;
 use crate::pose::TruePose;
+use crate::robot::{Steering, WheelErrors};
 use crate::scenes;
 use crate::spaces;
-use crate::world::World;
+use crate::world::{Surface, World};
 
 /// Where a robot drives, and how.
 #[derive(Debug, Clone, Default)]
@@ -29,10 +45,156 @@ pub struct Place {
     pub start: TruePose,
     /// Corners of its way; it stops at the last one.
     pub way: Vec<[f64; 2]>,
+    /// What robot and lidar are like there.
+    pub nature: Nature,
+    /// What moves there.
+    pub moving: Moving,
+}
+
+/// What a place makes of a robot and its lidar: nothing by default.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Nature {
+    /// The robot's wheels.
+    pub steering: Steering,
+    /// Slips a second, and the least and the largest, as shares of what a wheel rolls.
+    pub slip: Option<[f64; 3]>,
+    /// As [`Ranging`] has them: bias, growth of the noise with the range and where faces are grazed, width of a beam.
+    pub bias: f64,
+    /// See there.
+    pub sigma_share: f64,
+    /// See there.
+    pub grazing: f64,
+    /// See there.
+    pub width: f64,
+    /// The motor is faster and slower by this share of its speed.
+    pub sway: f64,
+    /// Messages of the wheels a second; `None`: one for each revolution of the lidar.
+    pub wheels_per_s: Option<f64>,
+    /// Bias and noise of a gyroscope (rad/s), where there is one.
+    pub gyro: Option<[f64; 2]>,
+    /// When (s) the lidar is knocked, and by how much it is turned (rad).
+    pub knock: Option<[f64; 2]>,
+}
+
+/// A leaf that opens by a quarter turn about where its face starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Door {
+    /// Which of the world's straight faces it is.
+    face: usize,
+    /// Its edge while it is shut.
+    shut: [f64; 2],
+    /// When it begins to open, and when it is open (s).
+    between: [f64; 2],
+}
+
+/// Somebody who walks straight on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Person {
+    /// Which of the world's round faces it is.
+    face: usize,
+    /// Where at the start, and how fast (m, m/s).
+    start: [f64; 2],
+    velocity: [f64; 2],
+}
+
+/// What of a place moves.
+#[derive(Debug, Clone, Default)]
+pub struct Moving {
+    doors: Vec<Door>,
+    people: Vec<Person>,
+}
+
+impl Moving {
+    /// Puts all into `world` as it is at a time (s).
+    pub fn place(&self, time: f64, world: &mut World) {
+        for door in &self.doors {
+            let [begin, end] = door.between;
+            let share = ((time - begin) / (end - begin).max(1e-3)).clamp(0.0, 1.0);
+            let angle = share * core::f64::consts::FRAC_PI_2;
+            let (s, c) = (libm::sin(angle), libm::cos(angle));
+            let face = &mut world.segments[door.face];
+            let along = [0, 1].map(|k| door.shut[k] - face.from[k]);
+            face.to = [
+                face.from[0] + c * along[0] - s * along[1],
+                face.from[1] + s * along[0] + c * along[1],
+            ];
+        }
+        for person in &self.people {
+            let at = [0, 1].map(|k| person.start[k] + time * person.velocity[k]);
+            world.circles[person.face].centre = at;
+        }
+    }
+}
+
+impl Nature {
+    /// A lidar's ranging there.
+    #[must_use]
+    pub fn ranging(&self, ranging: Ranging) -> Ranging {
+        Ranging {
+            bias: ranging.bias + self.bias,
+            sigma_share: ranging.sigma_share.max(self.sigma_share),
+            grazing: ranging.grazing.max(self.grazing),
+            width: ranging.width.max(self.width),
+            ..ranging
+        }
+    }
+
+    /// What wheels get wrong there.
+    #[must_use]
+    pub fn wheels(&self, wheels: WheelErrors) -> WheelErrors {
+        match self.slip {
+            None => wheels,
+            Some([slips_per_s, least, most]) => WheelErrors {
+                slips_per_s,
+                slip: [least, most],
+                ..wheels
+            },
+        }
+    }
+
+    fn take(&mut self, word: &str, rest: &str) -> Result<(), String> {
+        let (name, rest) = match word {
+            "slip" | "wheels" | "gyro" | "knock" => (word, rest),
+            _ => rest.trim().split_once(' ').unwrap_or((rest.trim(), "")),
+        };
+        let numbers = numbers(rest)?;
+        match (word, name, &numbers[..]) {
+            ("drive", "differential", []) => self.steering = Steering::Differential,
+            ("drive", "omni", []) => self.steering = Steering::Omni,
+            ("drive", "ackermann", [radius]) if *radius > 0.0 => {
+                self.steering = Steering::Ackermann(*radius);
+            }
+            ("slip", _, [often, least, most])
+                if *often >= 0.0
+                    && (0.0..=100.0).contains(least)
+                    && (*least..=100.0).contains(most) =>
+            {
+                self.slip = Some([*often, 0.01 * least, 0.01 * most]);
+            }
+            ("wheels", _, [rate]) if *rate > 0.0 => self.wheels_per_s = Some(*rate),
+            ("gyro", _, [bias, noise]) if *noise >= 0.0 => {
+                self.gyro = Some([bias.to_radians(), noise.to_radians()]);
+            }
+            ("knock", _, [seconds, degrees]) => self.knock = Some([*seconds, degrees.to_radians()]),
+            ("lidar", "bias", [bias]) => self.bias = *bias,
+            ("lidar", "distance", [share]) if *share >= 0.0 => self.sigma_share = *share,
+            ("lidar", "grazing", [times]) if *times >= 0.0 => self.grazing = *times,
+            ("lidar", "width", [degrees]) if *degrees >= 0.0 => self.width = degrees.to_radians(),
+            ("lidar", "sway", [share]) if (0.0..0.5).contains(share) => self.sway = *share,
+            _ => {
+                return Err(format!(
+                    "{word} cannot be made of: {} {}",
+                    name,
+                    rest.trim()
+                ));
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Names of the built-in places, and what each is.
-pub const NAMES: [(&str, &str); 8] = [
+pub const NAMES: [(&str, &str); 9] = [
     ("flat", "four furnished rooms, a round of 39 m"),
     ("room", "an empty room of 5 m by 4 m"),
     ("corridor", "25 m with niches of doors, there and back"),
@@ -44,19 +206,22 @@ pub const NAMES: [(&str, &str); 8] = [
     ("aisles", "a warehouse with rows of shelves that look alike"),
     ("yard", "buildings 10 to 60 m away, trees, hedges, cars"),
     ("maze", "passages 1.2 m wide"),
+    ("dock", "a charging station in a corner, driven to"),
 ];
 
 /// What a description may name to be read: `ros-map`.
 pub type ReadMap<'a> = dyn FnMut(&str) -> Result<World, String> + 'a;
 
 impl Place {
-    /// The built-in place of this name; `None` if there is none. What is random in it comes from `seed`.
+    /// The built-in place of this name, or an empty room by its sides, `6x4` (m); `None` if there is none. What is random in it
+    /// comes from `seed`.
     #[must_use]
     pub fn named(name: &str, seed: u64) -> Option<Self> {
         let along = |world: World, end: f64| Self {
             world,
             start: TruePose::new(1.2, 0.0, 0.0),
             way: vec![[end, 0.0], [1.2, 0.0]],
+            ..Self::default()
         };
         Some(match name {
             "flat" => {
@@ -65,6 +230,7 @@ impl Place {
                     world: scenes::flat(),
                     start,
                     way,
+                    ..Self::default()
                 }
             }
             "room" => Self::built_in(include_str!("../worlds/room.txt")),
@@ -82,6 +248,7 @@ impl Place {
                     [10.0, 0.0],
                     [-20.0, 0.0],
                 ],
+                ..Self::default()
             },
             "aisles" => Self::built_in(include_str!("../worlds/aisles.txt")),
             "yard" => {
@@ -97,11 +264,31 @@ impl Place {
                         [4.0, -4.0],
                         [0.0, 0.0],
                     ],
+                    ..Self::default()
                 });
                 yards.into_iter().find(|yard| yard.check().is_ok())?
             }
             "maze" => Self::built_in(include_str!("../worlds/maze.txt")),
-            _ => return None,
+            "dock" => Self::built_in(include_str!("../worlds/dock.txt")),
+            _ => return Self::rectangle(name),
+        })
+    }
+
+    /// An empty room by its sides, `6x4`, driven around half-way between its middle and its walls.
+    fn rectangle(name: &str) -> Option<Self> {
+        let (length, width) = name.split_once('x')?;
+        let sides: [f64; 2] = [length.parse().ok()?, width.parse().ok()?];
+        if !sides.iter().all(|side| (1.0..1000.0).contains(side)) {
+            return None;
+        }
+        let [x, y] = sides.map(|side| 0.25 * side);
+        let mut world = World::default();
+        world.block([-2.0 * x, -2.0 * y], [2.0 * x, 2.0 * y]);
+        Some(Self {
+            world,
+            start: TruePose::new(-x, -y, 0.0),
+            way: vec![[x, -y], [x, y], [-x, y], [-x, -y]],
+            ..Self::default()
         })
     }
 
@@ -131,13 +318,29 @@ impl Place {
                 place.world.add(read_map(rest.trim()).map_err(at)?);
                 continue;
             }
+            if let "drive" | "slip" | "lidar" | "wheels" | "gyro" | "knock" = word {
+                place.nature.take(word, rest).map_err(at)?;
+                continue;
+            }
             let numbers = numbers(rest).map_err(at)?;
             match (word, &numbers[..]) {
-                ("wall", [_, _, _, _, ..]) if numbers.len() % 2 == 0 => {
+                ("wall" | "glass" | "mirror" | "black", [_, _, _, _, ..])
+                    if numbers.len() % 2 == 0 =>
+                {
+                    let surface = match word {
+                        "glass" => Surface::Glass,
+                        "mirror" => Surface::Mirror,
+                        "black" => Surface::Black,
+                        _ => Surface::Plain,
+                    };
                     let points = points(&numbers);
                     for pair in points.windows(2) {
-                        place.world.line(pair[0], pair[1]);
+                        place.world.face(pair[0], pair[1], surface);
                     }
+                }
+                ("rectangle", [length, width]) if *length > 0.0 && *width > 0.0 => {
+                    let corner = [0.5 * length, 0.5 * width];
+                    place.world.block(corner.map(|side| -side), corner);
                 }
                 ("box", [x, y, u, v]) => place
                     .world
@@ -147,6 +350,26 @@ impl Place {
                     [(u - x).abs(), (v - y).abs()],
                     degrees.to_radians(),
                 ),
+                ("door", [x, y, u, v, begin, end]) if begin < end => {
+                    let shut = [*u, *v];
+                    place.moving.doors.push(Door {
+                        face: place.world.segments.len(),
+                        shut,
+                        between: [*begin, *end],
+                    });
+                    place.world.line([*x, *y], shut);
+                }
+                ("person", [x, y, degrees, speed]) => {
+                    /// Of a body (m).
+                    const RADIUS: f64 = 0.2;
+                    let (start, towards) = ([*x, *y], degrees.to_radians());
+                    place.moving.people.push(Person {
+                        face: place.world.circles.len(),
+                        start,
+                        velocity: [speed * libm::cos(towards), speed * libm::sin(towards)],
+                    });
+                    place.world.column(start, RADIUS);
+                }
                 ("column", [x, y, radius]) if *radius > 0.0 => {
                     place.world.column([*x, *y], *radius)
                 }
@@ -165,12 +388,16 @@ impl Place {
                     start = Some(TruePose::new(*x, *y, degrees.to_radians()))
                 }
                 ("way", [_, _, ..]) if numbers.len() % 2 == 0 => place.way.extend(points(&numbers)),
-                ("wall" | "box" | "column" | "map" | "start" | "way", _) => {
+                (
+                    "wall" | "glass" | "mirror" | "black" | "rectangle" | "box" | "column" | "door"
+                    | "person" | "map" | "start" | "way",
+                    _,
+                ) => {
                     return Err(at(format!("{word} cannot be made of: {}", rest.trim())));
                 }
                 _ => {
                     return Err(at(format!(
-                        "{word}? wall, box, column, map, ros-map, start and way are known"
+                        "{word}? wall, glass, mirror, black, rectangle, box, column, door, person, map, ros-map, start, way, drive, wheels, slip, gyro, knock and lidar are known"
                     )));
                 }
             }
@@ -185,6 +412,9 @@ impl Place {
     fn check(&self) -> Result<(), String> {
         /// Half the width of the robot (m).
         const NEAREST: f64 = 0.12;
+        // Doors open and people pass: what moves is met or not.
+        let mut world = self.world.clone();
+        self.moving.place(1e9, &mut world);
         if self.way.is_empty() {
             return Err("no way: `way X Y ...`, or letters in a drawing".into());
         }
@@ -193,7 +423,7 @@ impl Place {
             for k in 0..=20 {
                 let share = f64::from(k) / 20.0;
                 let place = [0, 1].map(|axis: usize| from[axis] + share * (to[axis] - from[axis]));
-                let near = self.world.clearance(place);
+                let near = world.clearance(place);
                 if near < NEAREST {
                     return Err(format!(
                         "the way from {:.2} {:.2} to {:.2} {:.2} comes within {near:.2} m of something at {:.2} {:.2}",
@@ -288,6 +518,7 @@ mod tests {
             include_str!("../worlds/room.txt"),
             include_str!("../worlds/aisles.txt"),
             include_str!("../worlds/maze.txt"),
+            include_str!("../worlds/dock.txt"),
         ] {
             parse(text).unwrap_or_else(|why| panic!("{why}:\n{text}"));
         }
@@ -300,7 +531,12 @@ mod tests {
                     .unwrap_or_else(|why| panic!("{name}, seed {seed}: {why}"));
             }
         }
-        assert!(Place::named("moon", 1).is_none());
+        let room = Place::named("6.5x4", 1).expect("a rectangle");
+        assert_eq!(room.world.extent(), ([-3.25, -2.0], [3.25, 2.0]));
+        room.check().expect("its way");
+        for name in ["moon", "0x4", "4x", "infx2", "4x4x4"] {
+            assert!(Place::named(name, 1).is_none(), "{name}");
+        }
     }
 
     #[test]
@@ -316,6 +552,78 @@ mod tests {
         assert_eq!(place.world.segments.iter().filter(inner).count(), 4);
         let range = place.world.clearance([3.0, 3.0]);
         assert!((range - 1.0).abs() < 1e-9, "{range}");
+    }
+
+    #[test]
+    fn a_description_says_what_faces_robot_and_lidar_are_like() {
+        let text = "rectangle 8 6\nmirror -4 -1 -4 1\nglass 4 -1 4 1\nblack -1 3 1 3\nstart 0 0 0\nway 2 0\n\
+                    drive ackermann 0.6\nslip 2 30 100\nlidar bias 0.02\nlidar distance 0.01\nlidar grazing 1\n\
+                    lidar width 0.3\nlidar sway 0.05";
+        let place = parse(text).expect("a place");
+        let of = |surface| {
+            let faces = place.world.segments.iter();
+            faces.filter(|face| face.surface == surface).count()
+        };
+        let all = [
+            Surface::Plain,
+            Surface::Mirror,
+            Surface::Glass,
+            Surface::Black,
+        ]
+        .map(of);
+        assert_eq!(all, [4, 1, 1, 1]);
+        let Nature {
+            steering,
+            bias,
+            sway,
+            ..
+        } = place.nature;
+        assert_eq!(
+            (steering, bias, sway),
+            (Steering::Ackermann(0.6), 0.02, 0.05)
+        );
+        let ranging = place.nature.ranging(Ranging::DEFAULT);
+        assert_eq!((ranging.bias, ranging.sigma_share), (0.02, 0.01));
+        assert_eq!((ranging.grazing, ranging.width), (1.0, 0.3f64.to_radians()));
+        let wheels = place.nature.wheels(WheelErrors::DEFAULT);
+        assert_eq!((wheels.slips_per_s, wheels.slip), (2.0, [0.3, 1.0]));
+        for line in [
+            "drive sledge",
+            "drive ackermann",
+            "slip 1 50 20",
+            "slip 1 50 120",
+            "lidar",
+            "lidar sway 2",
+            "lidar colour 1",
+            "rectangle 3",
+            "glass 1 1",
+        ] {
+            let why = parse(&format!("{text}\n{line}")).expect_err(line);
+            assert!(why.contains("line 14"), "{line}: {why}");
+        }
+    }
+
+    #[test]
+    fn doors_open_and_people_walk() {
+        let text = "rectangle 8 6\ndoor 1 -1 1 1 5 8\nperson 0 2 180 0.5\nstart -2 0 0\nway 2 0\nwheels 7\ngyro 1 0.5\nknock 10 5";
+        let place = parse(text).expect("a place");
+        let ahead = |seconds: f64| {
+            let mut world = place.world.clone();
+            place.moving.place(seconds, &mut world);
+            [
+                world.cast([0.0, 0.0], [1.0, 0.0]),
+                world.cast([-1.0, 0.0], [0.0, 1.0]),
+            ]
+        };
+        // Shut until 5 s; the person stands at the lidar's left after two seconds.
+        assert_eq!(ahead(0.0), [Some(1.0), Some(3.0)]);
+        let [door, person] = ahead(2.0);
+        assert_eq!(door, Some(1.0));
+        assert!(person.is_some_and(|range| (range - 1.8).abs() < 1e-9));
+        assert_eq!(ahead(8.0), [Some(4.0), Some(3.0)]);
+        assert_eq!(place.nature.wheels_per_s, Some(7.0));
+        assert_eq!(place.nature.gyro, Some([1.0, 0.5].map(f64::to_radians)));
+        assert_eq!(place.nature.knock, Some([10.0, 5.0f64.to_radians()]));
     }
 
     #[test]

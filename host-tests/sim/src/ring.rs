@@ -59,7 +59,8 @@ pub struct Ring {
     model: RingModel,
     noise: Noise,
     looks: usize,
-    /// The scans so far: looks at the world until then, and the beams, counter-clockwise from straight ahead.
+    /// The scans so far: looks at the world until then, and the beams, counter-clockwise from behind, as
+    /// recordings give beams of one moment.
     pub scans: Vec<(usize, Vec<Beam>)>,
 }
 
@@ -85,7 +86,7 @@ impl Encoder for Ring {
         let (time_us, width) = (self.next_time_us(), self.model.width());
         let model = self.model;
         let is_there = |k: &usize| !model.half || (k / model.zones).is_multiple_of(2);
-        let beams: Vec<Beam> = (0..model.beams)
+        let mut beams: Vec<Beam> = (0..model.beams)
             .filter(is_there)
             .map(|k| {
                 let middle = width * k as f64;
@@ -110,6 +111,7 @@ impl Encoder for Ring {
                 }
             })
             .collect();
+        beams.sort_by_key(|beam| beam.bearing.0 as i16);
         self.looks += beams.len() * RAYS as usize;
         self.scans.push((self.looks, beams));
     }

@@ -3,6 +3,20 @@
 use super::noise::Noise;
 use super::pose::TruePose;
 
+/// What a face is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Surface {
+    /// It scatters light back.
+    #[default]
+    Plain,
+    /// Of ten beams four pass, four are lost, two return.
+    Glass,
+    /// It shows what lies before it as if it were behind it.
+    Mirror,
+    /// It returns little light: see [`Ranging`](super::lidar::Ranging).
+    Black,
+}
+
 /// A straight wall from one point to another (m).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
@@ -10,6 +24,19 @@ pub struct Segment {
     pub from: [f64; 2],
     /// End.
     pub to: [f64; 2],
+    /// What it is made of.
+    pub surface: Surface,
+}
+
+/// What a beam meets first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// How far (m).
+    pub range: f64,
+    /// Unit normal of the face there, to either side.
+    pub normal: [f64; 2],
+    /// What it is made of.
+    pub surface: Surface,
 }
 
 /// A round column (m).
@@ -108,7 +135,12 @@ impl World {
 
     /// Adds one straight face.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2]) {
-        self.segments.push(Segment { from, to });
+        self.face(from, to, Surface::Plain);
+    }
+
+    /// Adds one straight face of something.
+    pub fn face(&mut self, from: [f64; 2], to: [f64; 2], surface: Surface) {
+        self.segments.push(Segment { from, to, surface });
     }
 
     /// Adds the four faces of the box between two opposite corners.
@@ -178,6 +210,35 @@ impl World {
             .reduce(|a, b| if a < b { a } else { b })
     }
 
+    /// The first face from `from` along the unit vector `towards`, if there is one.
+    #[must_use]
+    pub fn hit(&self, from: [f64; 2], towards: [f64; 2]) -> Option<Hit> {
+        let straight = self.segments.iter().filter_map(|segment| {
+            let range = segment.cast(from, towards)?;
+            Some((range, Face::Straight(segment)))
+        });
+        let round = self.circles.iter().filter_map(|circle| {
+            let range = circle.cast(from, towards)?;
+            Some((range, Face::Round(circle)))
+        });
+        let (range, face) = straight
+            .chain(round)
+            .reduce(|a, b| if a.0 < b.0 { a } else { b })?;
+        let (across, surface) = match face {
+            Face::Straight(s) => ([s.from[1] - s.to[1], s.to[0] - s.from[0]], s.surface),
+            Face::Round(c) => {
+                let at = [0, 1].map(|k: usize| from[k] + range * towards[k] - c.centre[k]);
+                (at, Surface::Plain)
+            }
+        };
+        let length = libm::hypot(across[0], across[1]);
+        Some(Hit {
+            range,
+            normal: across.map(|side| side / length),
+            surface,
+        })
+    }
+
     /// Distance (m) from `place` to the nearest face; infinite in an empty world.
     #[must_use]
     pub fn clearance(&self, place: [f64; 2]) -> f64 {
@@ -187,6 +248,12 @@ impl World {
             .chain(round)
             .fold(f64::INFINITY, |a, b| if a < b { a } else { b })
     }
+}
+
+/// A face that a beam may meet.
+enum Face<'a> {
+    Straight(&'a Segment),
+    Round(&'a Circle),
 }
 
 impl Segment {

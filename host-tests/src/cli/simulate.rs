@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use beamfix::geometry::Pose;
 use beamfix::grid::occupancy;
 use beamfix::lidar::Model;
@@ -48,7 +48,7 @@ pub struct Args {
     /// The lidar on board: a name that `lidars` lists, or vl53l5cx-ring, eight rangers of eight zones around the robot.
     #[arg(long, value_name = "MODEL", default_value = "ld06")]
     lidar: String,
-    /// Where the robot drives: flat, room, corridor, office, hall, aisles, yard, maze; or a file that describes a place
+    /// Where the robot drives: flat, room, corridor, office, hall, aisles, yard, maze, dock; an empty room by its sides, 6x4; or a file that describes a place
     /// (walls, boxes, columns, a drawing, a ROS map, a start and a way: host-tests/sim/worlds has some).
     #[arg(long, value_name = "NAME|FILE", default_value = "flat")]
     world: String,
@@ -99,7 +99,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
 /// Drives through a place with a lidar of `model`.
 pub fn drive(place: Place, settings: &Settings, model: &'static Model) -> Result<Driven> {
-    let drive = beamfix_sim::drive_in(place, settings, encoder::for_model(model).as_mut());
+    let mut sensor = encoder::for_model(model);
+    ensure!(
+        sensor.sway(place.nature.sway),
+        "--lidar {}: the simulated one turns steadily, and the place wants its speed to sway",
+        model.name
+    );
+    let drive = beamfix_sim::drive_in(place, settings, sensor.as_mut());
     let (bytes, revolutions, summary) = simulated::capture(&drive, settings.mount, model)?;
     let moment = |revolution| simulated::moment(&drive, revolution);
     let moments: Option<Vec<Moment>> = revolutions.iter().map(moment).collect();

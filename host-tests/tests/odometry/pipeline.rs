@@ -322,6 +322,7 @@ fn wheels_of_any_rate_and_a_gyroscope_lead_through_a_cover_that_blinds_the_lidar
         scale: [0.0; 2],
         noise: 0.0,
         slips_per_s: 0.0,
+        ..WheelErrors::DEFAULT
     };
     let drive = driven_on(to + 0.2, wheels);
     let revolutions = revolutions(&drive.bytes);

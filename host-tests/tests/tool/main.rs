@@ -5,6 +5,8 @@ mod cli;
 mod common;
 mod fields;
 mod leave;
+mod live;
+mod places;
 mod recordings;
 mod regress;
 mod scenes;

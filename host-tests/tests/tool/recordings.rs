@@ -43,6 +43,7 @@ fn scan(world: &World, farthest: f64, start: f64, step: f64, backwards: bool) ->
         sigma: 0.005,
         nearest: 0.05,
         farthest,
+        ..Ranging::DEFAULT
     };
     (0..BEAMS)
         .map(|k| {

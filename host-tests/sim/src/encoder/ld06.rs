@@ -53,6 +53,9 @@ pub fn crc8(bytes: &[u8]) -> u8 {
     })
 }
 
+/// A motor's speed comes back so often (s).
+const SWAY_S: f64 = 2.7;
+
 /// A sensor that turns steadily and measures steadily; its frames are not aligned to its turns.
 #[derive(Debug, Clone)]
 pub struct Sensor {
@@ -60,6 +63,8 @@ pub struct Sensor {
     turns_per_s: f64,
     /// Where the first beam points, clockwise (turns).
     phase: f64,
+    /// The motor is faster and slower by this share of its speed, and back every [`SWAY_S`].
+    sway: f64,
     parallax: Parallax,
     /// Beams measured.
     count: u64,
@@ -82,6 +87,7 @@ impl Sensor {
             points_per_s: model.points_per_s.into(),
             turns_per_s: f64::from(model.revolutions_per_10s) / 10.0,
             phase: 0.123,
+            sway: 0.0,
             parallax: match model.family {
                 Family::Ldrobot(parallax) => parallax,
                 _ => Parallax::None,
@@ -120,7 +126,15 @@ impl Sensor {
 
     /// Clockwise angle, in turns, within [0, 1).
     fn angle(&self, beam: u64) -> f64 {
-        (self.phase + self.turns_per_s * self.time_s(beam)).rem_euclid(1.0)
+        let time = self.time_s(beam);
+        let ahead = self.sway * SWAY_S / TAU * (1.0 - libm::cos(TAU * time / SWAY_S));
+        (self.phase + self.turns_per_s * (time + ahead)).rem_euclid(1.0)
+    }
+
+    /// Turns a second when a beam is measured.
+    fn speed(&self, beam: u64) -> f64 {
+        let sway = self.sway * libm::sin(TAU * self.time_s(beam) / SWAY_S);
+        self.turns_per_s * (1.0 + sway)
     }
 
     fn cdeg(&self, beam: u64) -> u16 {
@@ -129,6 +143,11 @@ impl Sensor {
 }
 
 impl Encoder for Sensor {
+    fn sway(&mut self, share: f64) -> bool {
+        self.sway = share;
+        true
+    }
+
     fn next_time_us(&self) -> f64 {
         self.time_s(self.count) * 1e6
     }
@@ -149,12 +168,48 @@ impl Encoder for Sensor {
         self.points.clear();
         let first = self.count - POINTS as u64;
         let frame = Frame {
-            speed_deg_per_s: (self.turns_per_s * 360.0).round() as u16,
+            speed_deg_per_s: (self.speed(first) * 360.0).round() as u16,
             start_cdeg: self.cdeg(first),
             end_cdeg: self.cdeg(self.count - 1),
             stamp_ms: ((self.time_s(first) * 1e3) as u64 % 30_000) as u16,
             points,
         };
         line.extend(frame.bytes());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motor_whose_speed_sways_says_so_and_where_each_beam_looks() {
+        let mut sensor = Sensor::ld06();
+        assert!(sensor.sway(0.05));
+        let (mut looked, mut speeds) = (Vec::new(), Vec::new());
+        let mut line = Vec::new();
+        while sensor.next_time_us() < 6e6 {
+            let mut look = |time_us: f64, bearing: f64| {
+                looked.push((time_us, -bearing / TAU));
+                None
+            };
+            sensor.fire(&mut look, &mut line);
+        }
+        for (frame, beams) in line.chunks(47).zip(looked.chunks(POINTS)) {
+            let word = |at: usize| u16::from_le_bytes([frame[at], frame[at + 1]]);
+            speeds.push(word(2));
+            for (at, beam) in [(4, beams[0]), (42, beams[POINTS - 1])] {
+                let off = f64::from(word(at)) / 36_000.0 - beam.1;
+                assert!((off - off.round()).abs() < 2e-5, "{off}");
+            }
+        }
+        // 3600 deg/s, 5 % up and down; as far as the beams have turned in between.
+        let (least, most) = (speeds.iter().min(), speeds.iter().max());
+        assert_eq!((least, most), (Some(&3420), Some(&3780)));
+        for pair in looked.windows(2) {
+            let step = (pair[1].1 - pair[0].1).rem_euclid(1.0);
+            let speed = step / ((pair[1].0 - pair[0].0) * 1e-6);
+            assert!((9.49..10.51).contains(&speed), "{speed}");
+        }
     }
 }

@@ -29,7 +29,8 @@ const HEAD: usize = 2;
 
 /// A capture of a drive with a lidar of `model` at `mount`, its revolutions, and what its decoder counted.
 ///
-/// The wheels come in together with the bytes that complete a revolution.
+/// The wheels come in together with the bytes that complete a revolution, or at a rate of their own where the place says so;
+/// a gyroscope where there is one.
 pub fn capture(
     drive: &Drive,
     mount: TruePose,
@@ -41,13 +42,19 @@ pub fn capture(
         recorder.push(0, Content::Lidar(model.name))?;
         recorder.push(0, Content::Mount(mount.into()))?;
         let mut start = 0;
+        let mut beside = beside(drive).into_iter().peekable();
         for (frame, &(end, measured_us)) in drive.frames.iter().enumerate() {
             let on_line_us = (end - start) as f64 * 1e7 / f64::from(model.baud);
             let time_us = (measured_us + on_line_us) as u64;
+            while let Some((us, content)) = beside.next_if(|(us, _)| *us <= time_us) {
+                recorder.push(us, content)?;
+            }
             while let Some(revolution) =
                 revolutions.next_if(|revolution| revolution.piece <= frame + HEAD)
             {
-                if let Some(now) = moment(drive, revolution) {
+                if drive.nature.wheels_per_s.is_none()
+                    && let Some(now) = moment(drive, revolution)
+                {
                     recorder.push(time_us, Content::Wheels(now.wheels.into()))?;
                 }
             }
@@ -58,6 +65,27 @@ pub fn capture(
     };
     let (revolutions, summary) = log::revolutions(model.name, &write(&[])?)?;
     Ok((write(&revolutions)?, revolutions, summary))
+}
+
+/// What comes in at a rate of its own: wheels and gyroscope, with their times (µs).
+fn beside(drive: &Drive) -> Vec<(u64, Content<'static>)> {
+    let us = |seconds: f64| (seconds * 1e6) as u64;
+    let mut all: Vec<(u64, Content<'static>)> = drive
+        .gyro
+        .iter()
+        .map(|&(seconds, rate)| (us(seconds), Content::Gyro(rate as f32)))
+        .collect();
+    if let Some(rate) = drive.nature.wheels_per_s {
+        let mut next = 0.0;
+        for moment in &drive.moments {
+            if moment.time >= next {
+                all.push((us(moment.time), Content::Wheels(moment.wheels.into())));
+                next += 1.0 / rate;
+            }
+        }
+    }
+    all.sort_by_key(|(us, _)| *us);
+    all
 }
 
 /// The log of a drive with a ring of rangers at `mount`, which has no bytes: its scans, and the wheels at each.
