@@ -24,7 +24,7 @@ lidar bias 0.01
 lidar distance 0.003
 lidar grazing 1
 lidar width 0.3
-lidar sway 0.03
+lidar sway 0.01
 ";
 
 #[test]
