@@ -213,18 +213,22 @@ impl World {
     /// The first face from `from` along the unit vector `towards`, if there is one.
     #[must_use]
     pub fn hit(&self, from: [f64; 2], towards: [f64; 2]) -> Option<Hit> {
-        let straight = self.segments.iter().filter_map(|segment| {
-            let range = segment.cast(from, towards)?;
-            Some((range, Face::Straight(segment)))
-        });
-        let round = self.circles.iter().filter_map(|circle| {
-            let range = circle.cast(from, towards)?;
-            Some((range, Face::Round(circle)))
-        });
-        let (range, face) = straight
-            .chain(round)
-            .reduce(|a, b| if a.0 < b.0 { a } else { b })?;
-        let (across, surface) = match face {
+        let (mut range, mut face) = (f64::INFINITY, None);
+        for segment in &self.segments {
+            if let Some(next) = segment.cast(from, towards)
+                && next <= range
+            {
+                (range, face) = (next, Some(Face::Straight(segment)));
+            }
+        }
+        for circle in &self.circles {
+            if let Some(next) = circle.cast(from, towards)
+                && next <= range
+            {
+                (range, face) = (next, Some(Face::Round(circle)));
+            }
+        }
+        let (across, surface) = match face? {
             Face::Straight(s) => ([s.from[1] - s.to[1], s.to[0] - s.from[0]], s.surface),
             Face::Round(c) => {
                 let at = [0, 1].map(|k: usize| from[k] + range * towards[k] - c.centre[k]);
@@ -261,12 +265,17 @@ impl Segment {
         let along = [self.to[0] - self.from[0], self.to[1] - self.from[1]];
         let start = [self.from[0] - from[0], self.from[1] - from[1]];
         let across = towards[0] * along[1] - towards[1] * along[0];
-        if across == 0.0 {
+        // Where on the segment, times `across`: most are missed, and division costs as much as all the rest.
+        let place = start[0] * towards[1] - start[1] * towards[0];
+        let is_met = match across > 0.0 {
+            true => (0.0..=across).contains(&place),
+            false => across < 0.0 && (across..=0.0).contains(&place),
+        };
+        if !is_met {
             return None;
         }
         let range = (start[0] * along[1] - start[1] * along[0]) / across;
-        let place = (start[0] * towards[1] - start[1] * towards[0]) / across;
-        (range > 0.0 && (0.0..=1.0).contains(&place)).then_some(range)
+        (range > 0.0).then_some(range)
     }
 
     fn distance(&self, place: [f64; 2]) -> f64 {
