@@ -277,7 +277,7 @@ mod tests {
             grazing: 1.0,
             ..usual
         };
-        let (_, sigma) = spread(grazing, 1.0472, 2.0);
+        let (_, sigma) = spread(grazing, core::f64::consts::FRAC_PI_3, 2.0);
         // At 60° the inverse cosine is 2.
         assert!((sigma - 0.02).abs() < 0.001, "{sigma}");
     }
