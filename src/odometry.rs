@@ -13,6 +13,8 @@ mod fusion;
 mod keyframes;
 mod motion;
 mod prior;
+mod refine;
+mod residuals;
 mod sparse;
 mod state;
 mod step;
@@ -93,7 +95,7 @@ impl<const N: usize> Odometry<N> {
     /// no match sees.
     #[inline(never)]
     fn conclude(&mut self, step: &mut Step, last: Twist, prior: &Prior, times: Times) {
-        let skew = self.skew(&step.outcome, last, prior.source, times);
+        let skew = self.skew(&step.outcome, last, prior, times);
         step.keyframe = self.is_keyframe(
             &step.outcome,
             (self.motion.twist.omega - last.omega) * times.duration,
@@ -117,17 +119,20 @@ impl<const N: usize> Odometry<N> {
 
     /// Covariance that the change of velocity since the last scan, whose velocity was `last`, adds to a matched pose.
     fn skew(
-        &self,
+        &mut self,
         outcome: &Result<Match, Refusal>,
         last: Twist,
-        source: Source,
+        prior: &Prior,
         times: Times,
     ) -> Covariance {
         /// Largest difference between the rotation by the wheels and the one that was found that is believed (rad).
         const MAX_ROTATION: f32 = 0.35;
+        let range = self.mean_range();
+        let residuals = &mut self.motion.residuals;
         outcome
             .as_ref()
             .map_or(Covariance(Sym3::diagonal(0.0, 0.0, 0.0)), |found| {
+                let bent = residuals.bent(found.residual, range);
                 let mut change = self.motion.twist.minus(last);
                 // Wheels that jumped may still have told a rotation.
                 let said = self.motion.said.theta - self.motion.twist.omega * times.seconds;
@@ -135,8 +140,25 @@ impl<const N: usize> Odometry<N> {
                     let said = Twist::from_motion(Pose::new(0.0, 0.0, said), times.seconds).omega;
                     change.omega = math::max(math::abs(change.omega), math::abs(said));
                 }
-                error_model::skew(change, times.duration, source, &found.covariance)
+                if self.refused_in_a_row > 0
+                    && prior.source == Source::Velocity
+                    && prior.turn_rate.is_none()
+                {
+                    // Between two matches a velocity is measured: after refused scans there was none.
+                    let since = times.seconds * f32::from(self.refused_in_a_row + 1);
+                    let unknown = error_model::turn_rate_after(since);
+                    change.omega = math::max(math::abs(change.omega), unknown);
+                }
+                let told = (&found.covariance, range, bent);
+                error_model::skew(change, times.duration, prior.source, told)
             })
+    }
+
+    /// How far away the scan's places are on the mean (m).
+    fn mean_range(&self) -> f32 {
+        let points = self.deskewed.points.as_slice();
+        let sum: u32 = points.iter().map(|point| u32::from(point.range)).sum();
+        1e-3 * sum as f32 / points.len().max(1) as f32
     }
 
     /// Takes the prior as the pose: the scan has no match.
@@ -144,6 +166,7 @@ impl<const N: usize> Odometry<N> {
     fn coast(&mut self, prior: &Prior, twist: Twist, times: Times, covered: bool) {
         self.motion
             .advance(prior.pose, twist, prior.wheel_twist, times);
+        self.motion.note_rate(None);
         self.wheel_errors.interrupt();
         let tracking = &mut self.tracking;
         tracking.blind += times.elapsed;

@@ -1,7 +1,7 @@
 //! Matching a scan: at the prior, and where that fails at other poses and other turn rates.
 
 use super::{
-    fusion::MAX_DIFFERENCE,
+    fusion::{MAX_DIFFERENCE, UNSURE},
     motion::{Source, Times},
     prior::{Prior, farther},
     state::Odometry,
@@ -17,9 +17,6 @@ use crate::{
     math,
     scan::Scan,
 };
-
-/// A match that explains less than this share of the beams is tried again from another guess.
-const UNSURE: f32 = 0.6;
 
 /// The best match of a scan so far, and the velocity that the scan was deskewed with for it.
 pub(super) struct Attempt<'a> {
@@ -104,74 +101,6 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
-    /// Fuses match and prior, and places the robot there. If the match implies another velocity than the scan was deskewed
-    /// with, deskews and matches again first.
-    #[inline(never)]
-    pub(super) fn refine(
-        &mut self,
-        scan: &Scan<N>,
-        (found, expected): (&mut Match, Twist),
-        prior: &Prior,
-        times: Times,
-    ) {
-        let back = -0.5 * times.duration;
-        let (end, _) = self.robot_pose(found);
-        self.deskewed.pose = end;
-        let mut middle = end * expected.displacement(back);
-        let retried = prior.wheel_twist.is_none() && expected != prior.twist;
-        let sudden = prior.wheel_twist.is_none() && (retried || self.refused_in_a_row > 0);
-        let during = if sudden {
-            // From the last scan's middle no velocity can be measured: that one's place was only a guess, or the velocity
-            // has changed since, as the scan itself tells better.
-            expected
-        } else {
-            let measured = self.motion.during(middle, prior.wheel_twist, times);
-            match prior.turn_rate {
-                Some(omega) if prior.wheel_twist.is_none() => Twist { omega, ..measured },
-                _ => measured,
-            }
-        };
-        if differs(
-            expected.displacement(times.duration),
-            during.displacement(times.duration),
-        ) {
-            self.deskewed.assign(scan, during, &self.config.points);
-            self.deskewed.pose = middle * during.displacement(-back);
-            if let Ok(again) = self.try_match(self.deskewed.pose, prior, self.rivals()) {
-                *found = again;
-                (self.deskewed.pose, _) = self.robot_pose(found);
-                middle = self.deskewed.pose * during.displacement(back);
-            }
-        }
-        self.place(found, (middle, during), prior, times);
-    }
-
-    /// Puts the robot where its match and its prior say: it was at `middle` in the middle of the scan, and moved as `during`
-    /// says. Apart: so that its memory is not on the stack during a match.
-    #[inline(never)]
-    fn place(
-        &mut self,
-        found: &Match,
-        (middle, during): (Pose, Twist),
-        prior: &Prior,
-        times: Times,
-    ) {
-        let half = during.displacement(0.5 * times.duration);
-        let (_, of_match) = self.robot_pose(found);
-        let unskewed = self.motion.unskewed(during, prior.source, times);
-        let matched = middle * half * unskewed;
-        let (pose, is_sure) = self.fuse(matched, &of_match, found, prior);
-        // The points are seen from where fusion has moved the robot to.
-        self.deskewed.pose = pose * matched.between(self.deskewed.pose);
-        self.learn((matched, is_sure), &of_match, prior, found);
-        let end = pose * unskewed.inverse();
-        self.motion.advance(end, during, prior.wheel_twist, times);
-        self.pose = pose;
-        self.covariance = self
-            .keyframe
-            .covariance_at(pose, &self.tracking.covariance());
-    }
-
     /// Tries other headings where the prior does not tell which of them it is, after a gap without wheels in a room that
     /// looks the same from several sides: takes the match that explains most, and refuses it if another explains about as
     /// much.
@@ -179,6 +108,8 @@ impl<const N: usize> Odometry<N> {
     pub(super) fn refuse_ambiguous(&self, prior: &Prior, best: &mut Attempt) {
         /// A heading known better than this (rad) decides between two sides of a hexagon.
         const SURE: f32 = 0.3;
+        /// Farther away than this (m) there are more places than starts: one of them fits by chance, but not most of a scan.
+        const FAR: f32 = 3.0;
         /// Headings that are tried, 30° apart: a room of three, four or six equal sides has its others there.
         const SIDES: u8 = 12;
         /// A match whose heading differs by more than this (rad) is another one.
@@ -191,10 +122,17 @@ impl<const N: usize> Odometry<N> {
         const MAX_SIGMAS: f32 = 3.0;
         // Of all beams: of a scan that sees half of the view, other beams meet the keyframe.
         let explained = |found: &Match| found.score * f32::from(found.overlap);
-        let sigma = math::sqrt(self.tracking.relative.0.tt);
+        let known = &self.tracking.relative.0;
+        let sigma = math::sqrt(known.tt);
         let Ok(found) = &*best.outcome else {
             return;
         };
+        if found.score < UNSURE && known.xx + known.yy > FAR * FAR {
+            *best.outcome = Err(Refusal::NoMatch(MatchError::Unlikely {
+                score: found.score,
+            }));
+            return;
+        }
         if sigma < SURE {
             return;
         }
@@ -350,28 +288,8 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
-    /// Learns from a match how good the wheels are.
-    fn learn(
-        &mut self,
-        (matched, is_sure): (Pose, bool),
-        of_match: &Covariance,
-        prior: &Prior,
-        found: &Match,
-    ) {
-        if prior.source == Source::Wheels && is_sure {
-            let off = self.tracking.wheels.between(matched);
-            self.wheel_errors
-                .learn(off, self.config.prior_error, prior.motion, of_match);
-        } else {
-            self.wheel_errors.interrupt();
-        }
-        if found.degenerate_direction.is_none() {
-            self.tracking.coasting = 0.0;
-        }
-    }
-
     /// Robot pose of a match, with its covariance relative to the keyframe.
-    fn robot_pose(&self, found: &Match) -> (Pose, Covariance) {
+    pub(super) fn robot_pose(&self, found: &Match) -> (Pose, Covariance) {
         let mount = &self.config.points.mount;
         let pose = self.keyframe.pose * mount.robot_motion(found.pose);
         // The match is about the lidar: its error of heading moves the robot's centre about it.
@@ -394,10 +312,4 @@ fn normalised(a: &Covariance, b: &Covariance, from: Pose, to: Pose) -> f32 {
     ];
     let information = a.0.plus(&b.0).inverse();
     information.map_or(f32::INFINITY, |information| information.quadratic(off))
-}
-
-/// Whether two motions skew a scan differently: by more than 1 cm or 0.3°.
-fn differs(a: Pose, b: Pose) -> bool {
-    let off = a.between(b);
-    off.distance() > 0.01 || math::abs(off.theta) > 0.005
 }

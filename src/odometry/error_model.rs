@@ -10,6 +10,8 @@ use crate::{
 /// Standard deviation of a robot's unforeseen acceleration (m/s², rad/s²): an ordinary robot brakes and turns in within
 /// twice of these.
 const ACCELERATION: (f32, f32) = (3.0, 4.0);
+/// Standard deviation of an unknown rate of turn (rad/s): a robot turns round in four seconds.
+const TURNING: f32 = 1.5;
 /// Standard deviation of an unknown velocity (m/s): robots drive at half a walking pace to a walking pace.
 pub(super) const WALKING: f32 = 0.8;
 /// Standard deviation of a heading of which nothing is known (rad): π/√3.
@@ -33,6 +35,11 @@ pub(super) fn coasting_between(before: f32, after: f32) -> Covariance {
     Covariance(Sym3::diagonal(d1 - d0, d1 - d0, r1 - r0))
 }
 
+/// Standard deviation of a rate of turn (rad/s) that was measured `seconds` ago.
+pub(super) fn turn_rate_after(seconds: f32) -> f32 {
+    math::min(ACCELERATION.1 * seconds, TURNING)
+}
+
 /// Covariance of the pose at a scan's end for what a match cannot see: the robot may have begun to accelerate since the
 /// middle of the scan, which took `duration` (s).
 pub(super) fn unforeseen(duration: f32) -> Covariance {
@@ -46,12 +53,14 @@ pub(super) fn unforeseen(duration: f32) -> Covariance {
 ///
 /// A constant acceleration is undone to first order; one that began in the middle of the scan leaves a quarter of the
 /// change with wheels, which tell the mean velocity of the scan, and half of it without. What the noise of three matches
-/// (each of covariance `of_match`) changes the velocity by on the mean is left out.
+/// (each of covariance `of_match`) changes the velocity by on the mean is left out. A scan bent by a rotation is moved as
+/// well: of beams all around that are turned by -θ to θ from the first to the last, places `range` (m) away move by
+/// `range`·θ/π on the mean. `bent` is a rotation (rad) of the end that the residuals tell.
 pub(super) fn skew(
     change: Twist,
     duration: f32,
     source: Source,
-    of_match: &Covariance,
+    (of_match, range, bent): (&Covariance, f32, f32),
 ) -> Covariance {
     let share = match source {
         Source::Wheels => 0.25,
@@ -64,10 +73,10 @@ pub(super) fn skew(
         share * math::sqrt(math::max(change * change - NOISE * noise, 0.0))
     };
     let noise = &of_match.0;
-    spread(
-        rest(change.speed(), noise.xx + noise.yy),
-        rest(change.omega, noise.tt),
-    )
+    let rotation = math::max(rest(change.omega, noise.tt), bent);
+    let distance = rest(change.speed(), noise.xx + noise.yy);
+    let moved = rotation * range * core::f32::consts::FRAC_1_PI;
+    spread(math::sqrt(distance * distance + moved * moved), rotation)
 }
 
 /// Covariance of standard deviations of both coordinates (m) and of the heading (rad).
@@ -260,5 +269,19 @@ mod tests {
         assert!((sigma(20.0) / sigma(10.0) - 2.0).abs() < 1e-3);
         let twice = coasting_between(0.0, 0.3).plus(&coasting_between(0.3, 0.7));
         assert!((twice.0.tt / coasting_between(0.0, 0.7).0.tt - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_bent_scan_is_moved_as_well() {
+        let exact = Covariance(Sym3::diagonal(0.0, 0.0, 0.0));
+        let turning = Twist {
+            omega: 1.0,
+            ..Twist::ZERO
+        };
+        let of = |range| skew(turning, 0.1, Source::Velocity, (&exact, range, 0.0)).0;
+        assert!((math::sqrt(of(3.0).tt) - 0.05).abs() < 1e-6);
+        assert_eq!(of(0.0).xx, 0.0);
+        // 2.9° of places 3 m away.
+        assert!((math::sqrt(of(3.0).xx) - 0.048).abs() < 1e-3);
     }
 }

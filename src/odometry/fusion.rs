@@ -1,6 +1,11 @@
 //! Where the robot is by its match and its prior, each weighed by its covariance.
 
-use super::{error_model::WALKING, motion::Source, prior::Prior, state::Odometry};
+use super::{
+    error_model::WALKING,
+    motion::{Source, Times},
+    prior::Prior,
+    state::Odometry,
+};
 use crate::{
     geometry::Pose,
     linalg::{Covariance, Sym3},
@@ -8,11 +13,18 @@ use crate::{
     math,
 };
 
+/// A match that explains less than this share of the beams is tried again from another guess, and is no better than the prior
+/// that it contradicts.
+pub(super) const UNSURE: f32 = 0.6;
 /// A direction that a smaller share of the beams constrains may be told by something that moves along with the robot:
 /// a person 1 m away, a trailer, a mast hide up to a sixth of the view.
 const COMPANION: f32 = 0.17;
-/// The same without wheels, which could contradict it: one person 1 m away.
+/// What was doubted is believed again from so many beams on: half as many more.
+const CERTAIN: f32 = 0.25;
+/// A match that says "stands" is doubted without wheels, which could contradict it, below this share: one person 1 m away.
 const COMPANION_ALONE: f32 = 0.1;
+/// A match that contradicts the last velocity by more standard deviations than so many is doubted where few beams tell it.
+const MAX_SIGMAS: f32 = 3.0;
 /// A robot that is slower than this is taken to stand (m/s).
 const STANDING: f32 = 0.1;
 /// Largest squared difference of match and prior, normalised by their covariances, at which both are believed: one in
@@ -45,6 +57,16 @@ fn weakest(information: &Sym3) -> ([f32; 2], f32) {
     ([c, s], share)
 }
 
+/// Length of a difference of two poses (m), a rotation counted at 1 m.
+fn length([x, y, theta]: [f32; 3]) -> f32 {
+    math::sqrt(x * x + y * y + theta * theta)
+}
+
+/// The longer of two differences of poses.
+fn larger(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    if length(b) > length(a) { b } else { a }
+}
+
 impl<const N: usize> Odometry<N> {
     /// Pose by the match that put the robot at `measured` with covariance `of_match`, and by the prior; and whether enough
     /// beams constrain every direction for no companion to have told it.
@@ -54,6 +76,7 @@ impl<const N: usize> Odometry<N> {
         of_match: &Covariance,
         found: &Match,
         prior: &Prior,
+        times: Times,
     ) -> (Pose, bool) {
         let off = [
             measured.x - prior.pose.x,
@@ -71,8 +94,11 @@ impl<const N: usize> Odometry<N> {
             0.0,
             self.keyframe.pose.theta + self.config.points.mount.robot_from_lidar.theta,
         );
-        tracking.doubt = [0.0; 2];
-        let mut is_sure = false;
+        let mut doubt = [0.0; 3];
+        let (mut is_sure, mut is_certain) = (false, false);
+        let is_unsure = found.score < UNSURE;
+        // Direction that few beams constrain, and how far off along it a match may be that something moving along told.
+        let mut weak = None;
         if let Some(degenerate) = &found.degenerate_direction {
             // Along it the match is the guess once more.
             let [x, y, t] = degenerate.direction;
@@ -82,7 +108,7 @@ impl<const N: usize> Odometry<N> {
         } else {
             let information = Covariance(found.information.0).rotated(heading).0;
             let ([ux, uy], share) = weakest(&information);
-            is_sure = share >= COMPANION;
+            (is_sure, is_certain) = (share >= COMPANION, share >= CERTAIN);
             if !is_sure {
                 let along = ux * off[0] + uy * off[1];
                 let since = self.keyframe.pose;
@@ -92,15 +118,16 @@ impl<const N: usize> Odometry<N> {
                     let sigma = math::sqrt(own.quadratic([ux, uy, 0.0]));
                     if math::abs(along) > 0.25 * math::abs(moved) + 2.0 * sigma {
                         r = r.plus(&Sym3::outer([ux, uy, 0.0]).scaled(4.0 * along * along));
-                        tracking.doubt = [ux * along, uy * along];
+                        doubt = [ux * along, uy * along, 0.0];
                     }
-                } else if share < COMPANION_ALONE {
+                } else if prior.source == Source::Velocity {
+                    weak = Some(([ux, uy], along));
                     // The match says that the robot stands: it may also drive, and all that tells it move along.
-                    let stands = math::abs(moved + along) < STANDING * tracking.seconds;
                     let straight = math::abs(math::wrap_angle(measured.theta - since.theta)) < 0.2;
-                    if stands && straight {
+                    let stands = math::abs(moved + along) < STANDING * tracking.seconds;
+                    if share < COMPANION_ALONE && stands && straight {
                         let walked = WALKING * tracking.seconds;
-                        tracking.doubt = [ux * walked, uy * walked];
+                        doubt = [ux * walked, uy * walked, 0.0];
                     }
                 }
             }
@@ -109,15 +136,44 @@ impl<const N: usize> Odometry<N> {
             .plus(&r)
             .inverse()
             .map_or(f32::INFINITY, |information| information.quadratic(off));
+        // A match that contradicts the last velocity in a direction that something moving along may tell: the robot may have gone
+        // on as before.
+        if let Some(([ux, uy], along)) = weak
+            && along * along > MAX_SIGMAS * MAX_SIGMAS * p.plus(&r).quadratic([ux, uy, 0.0])
+        {
+            doubt = larger(doubt, [ux * along, uy * along, 0.0]);
+        }
         let mut p = p;
         if prior.source == Source::Wheels {
             self.wheel_errors.note(difference <= MAX_DIFFERENCE);
         }
         if difference > MAX_DIFFERENCE {
             self.counters.contradicted = self.counters.contradicted.wrapping_add(1);
+            // A match that explains little of the scan is no better than the prior.
+            if is_unsure {
+                doubt = larger(doubt, off);
+            }
             // The prior is as wrong as the match says.
             p = p.plus(&Sym3::outer(off));
         }
+        // Against the same keyframe what was doubted once stays so, until enough beams know better in every direction: meanwhile
+        // the matches and the velocity before part.
+        let [x, y, _] = tracking.doubt;
+        if (x, y) == (0.0, 0.0) {
+            let (s, c) = math::sin_cos(self.pose.theta);
+            let last = self.motion.twist;
+            tracking.before = [c * last.vx - s * last.vy, s * last.vx + c * last.vy];
+        } else if is_unsure || !is_certain {
+            let [vx, vy] = tracking.before;
+            let seconds = times.elapsed;
+            let parted = [
+                x + measured.x - self.pose.x - seconds * vx,
+                y + measured.y - self.pose.y - seconds * vy,
+                0.0,
+            ];
+            doubt = larger(doubt, parted);
+        }
+        tracking.doubt = doubt;
         let both = invertible(&p).inverse().zip(invertible(&r).inverse());
         let fused = both.and_then(|(prior_information, match_information)| {
             let relative = prior_information.plus(&match_information).inverse()?;

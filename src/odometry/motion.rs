@@ -4,6 +4,7 @@
 //! middle in place to first order. Measured from end to end, half of each error would return with the other sign, scan
 //! after scan.
 
+use super::residuals::Residuals;
 use crate::{
     geometry::{Pose, Twist},
     math,
@@ -29,6 +30,9 @@ pub(super) enum Source {
     Velocity,
 }
 
+/// A smaller change of the rotation during a scan is the noise of two matches (rad).
+const NOISE: f32 = 0.015;
+
 /// Motion up to the last scan.
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
@@ -36,12 +40,17 @@ pub(super) struct Motion {
     pub twist: Twist,
     /// Robot in the middle of the last scan.
     middle: Pose,
+    /// Rate of turn from the middle of the scan before the last to the middle of the last (rad/s), if both
+    /// were measured.
+    rate: Option<f32>,
     /// Velocity during the last scan by the wheels; zero without them.
     wheel_twist: Twist,
     /// The motion that was measured or extrapolated last, before it was looked at for jumps.
     pub said: Pose,
     /// Time from the last scan's first beam to its last (s).
     duration: f32,
+    /// What residuals usually are.
+    pub residuals: Residuals,
     /// Running mean of the time from scan to scan (s).
     mean_interval: f32,
     /// Running mean of the distance of such a time from that mean (s): a clock that jitters.
@@ -53,9 +62,11 @@ impl Motion {
     pub const STANDING: Self = Self {
         twist: Twist::ZERO,
         middle: Pose::IDENTITY,
+        rate: None,
         wheel_twist: Twist::ZERO,
         said: Pose::IDENTITY,
         duration: 0.0,
+        residuals: Residuals::NONE,
         mean_interval: 0.0,
         jitter: 0.0,
     };
@@ -92,15 +103,15 @@ impl Motion {
         /// Hardest braking and turning of a robot (m/s², rad/s²) ...
         const HARDEST: (f32, f32) = (10.0, 20.0);
         /// ... and how far off a motion between two scans may be measured besides (m, rad).
-        const NOISE: (f32, f32) = (0.1, 0.15);
+        const OFF: (f32, f32) = (0.1, 0.15);
         if times.seconds <= 0.0 {
             return false;
         }
         let square = times.seconds * times.seconds;
         let far = |expected: Pose| {
             let off = expected.between(motion);
-            off.distance() > HARDEST.0 * square + NOISE.0
-                || math::abs(off.theta) > HARDEST.1 * square + NOISE.1
+            off.distance() > HARDEST.0 * square + OFF.0
+                || math::abs(off.theta) > HARDEST.1 * square + OFF.1
         };
         far(coasting.displacement(times.seconds)) && far(self.said)
     }
@@ -130,14 +141,24 @@ impl Motion {
         }
     }
 
+    /// How far ahead the rate of turn during a scan is of `omega` (rad/s), the rate from the last scan's middle to this one's
+    /// where there are no wheels: by half of what it has changed by since the scan before, if that is more than the noise of
+    /// matches whose heading has the variance `noise`.
+    pub fn lead(&self, omega: f32, noise: f32, times: Times) -> Option<f32> {
+        /// Variances of a match in a change of the rotation, which is 1, -2 and 1 times a match's error; three standard
+        /// deviations of it.
+        const SQUARES: f32 = 9.0 * 6.0;
+        let change = omega - self.rate?;
+        let turned = change * times.duration;
+        (turned * turned > math::max(SQUARES * noise, NOISE * NOISE)).then_some(0.5 * change)
+    }
+
     /// Rotation that a change of the turn rate adds between what a match of a scan deskewed with `during` says of its end
     /// and its real end: a constant acceleration since the last scan.
     ///
     /// Wheels tell the mean rate over the scan, and its middle lags by a twelfth of what the rate has changed by. Without
     /// them the rate is that from the last scan's middle to this one's, and a quarter did best in simulated drives.
     pub fn unskewed(&self, during: Twist, source: Source, times: Times) -> Pose {
-        /// Less is the noise of two matches (rad).
-        const NOISE: f32 = 0.015;
         let change = (during.omega - self.twist.omega) * times.duration;
         if math::abs(change) < NOISE {
             return Pose::IDENTITY;
@@ -155,6 +176,11 @@ impl Motion {
         self.wheel_twist = wheels.unwrap_or(Twist::ZERO);
         self.duration = times.duration;
         self.twist = twist;
+    }
+
+    /// Notes the rate of turn from the last scan's middle to this one's, as measured by two matches (rad/s).
+    pub fn note_rate(&mut self, rate: Option<f32>) {
+        self.rate = rate;
     }
 }
 
@@ -244,5 +270,20 @@ mod tests {
             let twist = told(truth, wheels, &[0.0, 0.02, 0.0, 0.0]);
             assert!((twist.omega - 0.4).abs() < 1e-3, "{wheels:?}: {twist:?}");
         }
+    }
+
+    #[test]
+    fn a_turn_rate_that_changes_steadily_is_led_by_half_a_scan() {
+        let mut motion = Motion::STANDING;
+        // Nothing is known of the rate before the first two matches.
+        assert_eq!(motion.lead(1.0, 1e-6, TIMES), None);
+        motion.note_rate(Some(0.6));
+        let lead = motion
+            .lead(1.0, 1e-6, TIMES)
+            .expect("a change of 2.3 deg a scan");
+        assert!((lead - 0.2).abs() < 1e-6);
+        // The noise of three matches, and what it may be.
+        assert_eq!(motion.lead(0.7, 1e-6, TIMES), None);
+        assert_eq!(motion.lead(1.0, 1e-3, TIMES), None);
     }
 }

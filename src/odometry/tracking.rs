@@ -14,8 +14,10 @@ pub(super) struct Tracking {
     pub shared: f32,
     /// Covariance of the keyframe's own noise, as part of the last match.
     pub noise: Covariance,
-    /// Displacement (m) that the pose is off by if it was decided wrongly whether something moves along with the robot.
-    pub doubt: [f32; 2],
+    /// Difference of poses (m, m, rad) that the pose is off by if matches were wrongly believed, or wrongly doubted.
+    pub doubt: [f32; 3],
+    /// Velocity before the first match that was doubted, in the frame of the start (m/s).
+    pub before: [f32; 2],
     /// Where the robot is by the predicted motions alone since the keyframe; by the wheels where there are any.
     pub wheels: Pose,
     /// Time since the robot's velocity was measured last (s).
@@ -36,7 +38,8 @@ impl Tracking {
             relative: NONE,
             shared: 0.0,
             noise: NONE,
-            doubt: [0.0; 2],
+            doubt: [0.0; 3],
+            before: [0.0; 2],
             wheels: pose,
             coasting,
             seconds: 0.0,
@@ -48,13 +51,9 @@ impl Tracking {
     /// Covariance of the pose relative to the keyframe, all told.
     pub fn covariance(&self) -> Covariance {
         let shared = self.noise.0.scaled(self.shared * self.shared);
-        let [x, y] = self.doubt;
-        let doubt = Sym3 {
-            xx: x * x,
-            xy: x * y,
-            yy: y * y,
-            ..Sym3::diagonal(0.0, 0.0, 0.0)
-        };
+        let [x, y, theta] = self.doubt;
+        // Of place and heading one may be wrong without the other.
+        let doubt = Sym3::outer([x, y, 0.0]).plus(&Sym3::diagonal(0.0, 0.0, theta * theta));
         Covariance(self.relative.0.plus(&shared).plus(&doubt))
     }
 }
@@ -70,7 +69,7 @@ mod tests {
         assert_eq!(tracking.covariance().0.xx, 0.0);
         tracking.shared = 0.5;
         assert_eq!(tracking.covariance().0.xx, 1.0);
-        tracking.doubt = [2.0, 0.0];
+        tracking.doubt = [2.0, 0.0, 0.0];
         assert_eq!(tracking.covariance().0.xx, 5.0);
     }
 }
