@@ -176,7 +176,7 @@ pub extern "C" fn recording() -> usize {
     })
 }
 
-/// What is to be drawn: see [`view::Part`] for the numbers and what each is.
+/// What is to be drawn, by its number: `view::Part` in the source has them.
 #[unsafe(no_mangle)]
 pub extern "C" fn look(part: u32) -> usize {
     with(|instance| {
