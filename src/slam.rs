@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | keep a scan as a keyframe, joined to the one before by what odometry tells | `keeping`, `store` |
 //! | find earlier keyframes that may see the same place | `loops`, `drift` |
+//! | find the place of a robot that was carried | `recognition`, `joining` |
 //! | match against what those around that place see together, check, wait for confirmation | `closing`, `verify` |
 //! | solve the pose graph, loops weighted by how well they agree | `solver`, `graph` |
 //! | remove the keyframe that tells least where the memory is full | `room`, `pruning` |
@@ -19,8 +20,12 @@
 //! only. Where the graph knows to 10 cm (σ) where the robot is, a match alone is a loop; elsewhere two others must close a
 //! cycle with it. Loops that contradict the rest later lose their weight in the solution (dynamic covariance scaling).
 //!
-//! What it does not do: scans that follow right after the robot was carried stand in a frame of before, doors that changed stay as the
-//! keyframes saw them, and a keyframe's covariance in the map is not computed.
+//! A robot that was carried (odometry gave up its keyframe and tells that the heading may be any) begins a submap of its own.
+//! Its keyframes are compared with all others, and it is joined to theirs once matches from places some metres apart agree.
+//! Until then [`Slam::is_located`] is false.
+//!
+//! What it does not do: doors that changed stay as the keyframes saw them, and a keyframe's covariance in the map is not
+//! computed.
 
 mod closing;
 mod config;
@@ -28,9 +33,11 @@ mod drift;
 #[cfg(feature = "embedded-storage")]
 mod flash;
 pub mod graph;
+mod joining;
 mod keeping;
 mod loops;
 mod pruning;
+mod recognition;
 mod rendering;
 mod room;
 pub mod solver;
@@ -93,6 +100,10 @@ pub struct Counters {
     pub dropped: u32,
     /// Solutions of the graph.
     pub solved: u32,
+    /// Submaps begun, as the robot was carried.
+    pub carried: u32,
+    /// Submaps that were joined to another one.
+    pub joined: u32,
 }
 
 /// Where a scan is: a pose in the frame of a keyframe.
@@ -155,6 +166,14 @@ pub struct Slam<const K: usize, const E: usize, const L: usize, const B: usize, 
     /// No keyframe can be removed until there is a new one.
     stuck: bool,
     last: Option<Last>,
+    /// Variance of the heading by odometry at the last scan (rad²).
+    heading_variance: f32,
+    /// The robot was carried, and there is no keyframe since then.
+    adrift: bool,
+    /// Number of the keyframe whose place was searched in other submaps last.
+    searched: Option<u32>,
+    /// The keyframe that is matched with other submaps, and its best score.
+    likeliest: Option<(Slot, f32)>,
     counters: Counters,
 }
 
@@ -186,6 +205,10 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
             merged: None,
             stuck: false,
             last: None,
+            heading_variance: 0.0,
+            adrift: false,
+            searched: None,
+            likeliest: None,
             counters: Counters {
                 keyframes: 0,
                 no_room: 0,
@@ -196,6 +219,8 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
                 loops: 0,
                 dropped: 0,
                 solved: 0,
+                carried: 0,
+                joined: 0,
             },
         }
     }
@@ -210,6 +235,21 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
     #[must_use]
     pub const fn counters(&self) -> Counters {
         self.counters
+    }
+
+    /// Whether the robot is where the map began, or came back there: `false` between the time at which it was carried and the
+    /// time at which enough matches tell where to.
+    #[must_use]
+    pub fn is_located(&self) -> bool {
+        self.last
+            .is_none_or(|last| !self.adrift && self.is_in_map(last.slot))
+    }
+
+    /// Whether a keyframe is in the submap of the oldest one.
+    #[must_use]
+    pub fn is_in_map(&self, slot: Slot) -> bool {
+        let submap = self.graph.node(slot).map(|node| node.submap);
+        submap.is_some() && submap == self.graph.oldest_submap()
     }
 
     /// The keyframe that was removed last; each is given once, and none is removed before it was taken.

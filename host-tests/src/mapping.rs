@@ -80,8 +80,11 @@ pub struct MappedScan {
     pub online: Pose,
     /// The robot by the map in the end.
     pub pose: Pose,
-    /// Whether a match of the odometry gave the pose, or it is the first.
+    /// Whether a match of the odometry gave the pose, or it is the first; and it is in the map in the end, not in a submap
+    /// of a robot that was carried.
     pub is_measured: bool,
+    /// Whether the robot was in the map when the scan came in.
+    pub is_located: bool,
 }
 
 /// Replays a log; `tick` is called for each scan.
@@ -217,6 +220,7 @@ fn replay<
         map.scans.push(MappedScan {
             stamp: scan.stamp.clone(),
             online: pose,
+            is_located: step.is_located,
             pose: step.odometry.pose,
             is_measured: step.odometry.outcome.is_ok()
                 || step.odometry.keyframe && step.odometry.outcome == Err(Refusal::First),
@@ -231,6 +235,11 @@ fn replay<
     for (scan, placed) in map.scans.iter_mut().zip(places) {
         // Before the first keyframe there is nothing but odometry.
         let placed = placed.map(|placed| estimator.followed(placed));
+        let is_in_map = |placed: Placed| {
+            let mut nodes = slam.graph().nodes();
+            nodes.any(|(slot, node)| node.id == placed.keyframe && slam.is_in_map(slot))
+        };
+        scan.is_measured &= placed.map_or(scan.is_located, is_in_map);
         if let Some(lidar) = placed.and_then(|placed| slam.pose(&placed)) {
             scan.pose = lidar * robot_from_lidar.inverse();
         }

@@ -32,8 +32,10 @@ pub struct Mapper<
 /// What is known of the robot in its map after a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mapped {
-    /// Robot at the scan's end, in the map as it is now (m, rad).
+    /// Robot at the scan's end, in the map as it is now (m, rad); unless it is located, in a frame of its own.
     pub pose: Pose,
+    /// Whether `pose` is in the map: not where the robot was carried, until it is known where to.
+    pub is_located: bool,
     /// In which keyframe's frame the lidar is: this stays true when the map changes.
     pub placed: Option<Placed>,
     /// What odometry says, in its own frame.
@@ -81,6 +83,7 @@ impl<const N: usize, const K: usize, const E: usize, const L: usize, const B: us
         let lidar = placed.and_then(|placed| self.slam.pose(&placed));
         Mapped {
             pose: lidar.map_or(odometry.pose, |lidar| lidar * mount.inverse()),
+            is_located: self.slam.is_located(),
             placed,
             odometry,
         }
@@ -97,7 +100,7 @@ impl<const N: usize, const K: usize, const E: usize, const L: usize, const B: us
 
 impl Estimate for Mapped {
     fn pose(&self) -> Option<Pose> {
-        Some(self.pose)
+        self.is_located.then_some(self.pose)
     }
 
     /// Not known: a graph's marginals are not computed. What odometry lost since the last keyframe is no bound.
@@ -106,6 +109,9 @@ impl Estimate for Mapped {
     }
 
     fn verdict(&self) -> Verdict {
-        self.odometry.verdict()
+        match self.is_located {
+            true => self.odometry.verdict(),
+            false => Verdict::Unknown,
+        }
     }
 }

@@ -51,7 +51,9 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
             self.counters.refused = self.counters.refused.wrapping_add(1);
             return false;
         };
-        self.propose(slot, candidate.slot, &found, loose);
+        if !candidate.is_anywhere() || self.is_likeliest(slot, found.score) {
+            self.propose(slot, candidate.slot, &found, loose);
+        }
         true
     }
 
@@ -115,7 +117,9 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         if loose {
             self.pending.push(edge);
             self.counters.waited = self.counters.waited.wrapping_add(1);
-            self.confirm(&edge);
+            if self.graph.are_in_one(earlier, slot) {
+                self.confirm(&edge);
+            }
         } else {
             self.close(edge);
         }
@@ -152,7 +156,7 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         }
     }
 
-    fn close(&mut self, edge: Edge) {
+    pub(super) fn close(&mut self, edge: Edge) {
         // The chain must find room in any case.
         let room = self.graph.edges().len() + super::FRESH < E;
         if room && self.graph.join(edge).is_ok() {

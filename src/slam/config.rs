@@ -41,6 +41,9 @@ pub struct SlamConfig {
     pub max_heading_gap: f32,
     /// Loops that must close a cycle with a new one where the graph cannot tell whether it is right. Default 2.
     pub min_votes: u8,
+    /// A robot that was carried knows where it is in the map once keyframes so far apart agree (m). Default 6: a room that looks
+    /// like another one is left before.
+    pub min_spread: f32,
 }
 
 impl SlamConfig {
@@ -64,6 +67,7 @@ impl SlamConfig {
         max_gap: 0.25,
         max_heading_gap: 0.06,
         min_votes: 2,
+        min_spread: 6.0,
     };
 }
 

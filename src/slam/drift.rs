@@ -69,6 +69,9 @@ impl<const K: usize, const E: usize> Drift<K, E> {
                 let Some(other) = edge.other(slot) else {
                     continue;
                 };
+                if edge.kind == Kind::Gap {
+                    continue;
+                }
                 // What is reached from nearer needs no second look.
                 if self.of(other).0 <= position {
                     continue;

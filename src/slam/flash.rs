@@ -17,7 +17,7 @@ use super::{
 /// Written and read at a time (bytes): the largest unit of any flash there is.
 const PAGE: usize = 256;
 const MAGIC: [u8; 4] = *b"BFSM";
-const VERSION: u16 = 1;
+const VERSION: u16 = 2;
 /// Bytes of a header in its page.
 const HEADER: usize = 36;
 

@@ -20,6 +20,8 @@ pub struct Node {
     pub pose: Pose,
     /// Number of the keyframe since the start, never given twice.
     pub id: u32,
+    /// Number of the submap: poses of two submaps say nothing about each other.
+    pub submap: u8,
     /// Whether the slot is in use.
     pub used: bool,
 }
@@ -31,6 +33,8 @@ pub enum Kind {
     Chain,
     /// By a match of two visits: doubted where it contradicts the others (see [`Edge::weight`]).
     Loop,
+    /// From one submap to the next: the robot was carried, and nothing is known but that there is a next one.
+    Gap,
 }
 
 /// A measured motion of the lidar from one node to another. 44 bytes.
@@ -63,11 +67,11 @@ impl Edge {
         ]
     }
 
-    /// Factor on the information at an error: 1 for edges of the chain; for loops dynamic covariance scaling, so that a
+    /// Factor on the information at an error: 1 but for loops; for these dynamic covariance scaling, so that a
     /// loop which contradicts all others counts for little. `phi` is the χ² up to which it counts in full.
     #[must_use]
     pub fn weight(&self, error: [f32; 3], phi: f32) -> f32 {
-        if self.kind == Kind::Chain {
+        if self.kind != Kind::Loop {
             return 1.0;
         }
         let scale = math::min(1.0, 2.0 * phi / (phi + self.information.0.quadratic(error)));
@@ -112,6 +116,7 @@ impl<const K: usize, const E: usize> Graph<K, E> {
         const FREE: Node = Node {
             pose: Pose::IDENTITY,
             id: 0,
+            submap: 0,
             used: false,
         };
         Self {
@@ -164,6 +169,31 @@ impl<const K: usize, const E: usize> Graph<K, E> {
         }
     }
 
+    /// Moves all nodes of a submap into another one, `motion` being the pose of the former's frame in the latter's.
+    ///
+    /// Edges between the two told nothing that is still true: they tell now what the poses do.
+    pub fn unite(&mut self, from: u8, into: u8, motion: Pose) {
+        for node in self.nodes.iter_mut().filter(|node| node.used) {
+            if node.submap == from {
+                (node.submap, node.pose) = (into, motion * node.pose);
+            }
+        }
+        let nodes = &self.nodes;
+        let pose = |slot: Slot| nodes.get(usize::from(slot)).map(|node| node.pose);
+        for edge in self.edges.iter_mut().filter(|edge| edge.kind == Kind::Gap) {
+            if let Some((from, to)) = pose(edge.from).zip(pose(edge.to)) {
+                edge.motion = from.between(to);
+            }
+        }
+    }
+
+    /// Whether two nodes are in one submap.
+    #[must_use]
+    pub fn are_in_one(&self, a: Slot, b: Slot) -> bool {
+        let submap = |slot| self.node(slot).map(|node| node.submap);
+        submap(a).is_some() && submap(a) == submap(b)
+    }
+
     /// The edges in no particular order.
     #[must_use]
     pub fn edges(&self) -> &[Edge] {
@@ -183,8 +213,8 @@ impl<const K: usize, const E: usize> Graph<K, E> {
         self.edges_at(a).any(|edge| edge.other(a) == Some(b))
     }
 
-    /// Adds a node; `None` where there is no room or the pose is not finite.
-    pub fn add(&mut self, pose: Pose) -> Option<Slot> {
+    /// Adds a node to a submap; `None` where there is no room or the pose is not finite.
+    pub fn add(&mut self, pose: Pose, submap: u8) -> Option<Slot> {
         if !pose.is_finite() {
             return None;
         }
@@ -192,6 +222,7 @@ impl<const K: usize, const E: usize> Graph<K, E> {
         *free = Node {
             pose,
             id: self.next_id,
+            submap,
             used: true,
         };
         self.used += 1;
@@ -222,6 +253,19 @@ impl<const K: usize, const E: usize> Graph<K, E> {
     #[cfg(feature = "embedded-storage")]
     pub(super) const fn set_next_id(&mut self, next_id: u32) {
         self.next_id = next_id;
+    }
+
+    /// The submap of the oldest node.
+    #[must_use]
+    pub fn oldest_submap(&self) -> Option<u8> {
+        let oldest = self.nodes().min_by_key(|(_, node)| node.id);
+        oldest.map(|(_, node)| node.submap)
+    }
+
+    /// A number that no submap has; `None` where all 256 are taken.
+    #[must_use]
+    pub fn free_submap(&self) -> Option<u8> {
+        (0..=u8::MAX).find(|submap| self.nodes().all(|(_, node)| node.submap != *submap))
     }
 
     /// Adds an edge between two nodes; gives it back where there is no room, or it is none: from a node to itself, to a

@@ -39,12 +39,19 @@ impl Candidate {
         3.0 * math::sqrt(self.variance.0) > LOOSE
     }
 
+    /// Whether the graph tells nothing of where the keyframe should be: it is in another submap.
+    pub(super) const fn is_anywhere(&self) -> bool {
+        self.variance.0 == f32::INFINITY
+    }
+
     /// Where a match starts: the first, second … guess.
     pub(super) fn guess(&self, attempt: u8) -> Option<Pose> {
         match attempt {
             0 => Some(self.guess),
             // Where the graph does not know, the robot may as well be back at the very place.
-            1 if self.is_loose() => Some(Pose::new(0.0, 0.0, self.guess.theta)),
+            1 if self.is_loose() && !self.is_anywhere() => {
+                Some(Pose::new(0.0, 0.0, self.guess.theta))
+            }
             _ => None,
         }
     }
@@ -68,7 +75,10 @@ pub(super) fn candidates<const K: usize, const E: usize>(
         let mut best: Option<(f32, Candidate, u32)> = None;
         for (other, node) in graph.nodes() {
             let taken = |(_, id): &(Candidate, u32)| id.abs_diff(node.id) < config.min_apart / 2;
-            if node.id.abs_diff(here.id) < config.min_apart || chosen.iter().any(taken) {
+            if node.submap != here.submap
+                || node.id.abs_diff(here.id) < config.min_apart
+                || chosen.iter().any(taken)
+            {
                 continue;
             }
             let guess = node.pose.between(here.pose);
@@ -150,14 +160,14 @@ pub(super) fn around<const K: usize, const E: usize>(
     reach: f32,
 ) -> Vec<Slot, AROUND> {
     let mut chosen: Vec<Slot, AROUND> = Vec::new();
-    let Some(here) = graph.pose(slot) else {
+    let Some(here) = graph.node(slot) else {
         return chosen;
     };
     for _ in 0..AROUND {
-        let others = graph
-            .nodes()
-            .filter(|(other, _)| *other != slot && !chosen.contains(other));
-        let ranked = others.map(|(other, node)| (other, here.between(node.pose).distance()));
+        let others = graph.nodes().filter(|(other, node)| {
+            *other != slot && node.submap == here.submap && !chosen.contains(other)
+        });
+        let ranked = others.map(|(other, node)| (other, here.pose.between(node.pose).distance()));
         let near = ranked.filter(|(_, distance)| *distance <= reach);
         let Some((other, _)) = near.min_by(|a, b| a.1.total_cmp(&b.1)) else {
             break;

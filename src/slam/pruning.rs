@@ -73,7 +73,7 @@ pub(super) fn merge<const K: usize, const E: usize>(
     };
     let best = graph
         .edges_at(slot)
-        .filter(|edge| believed(graph, edge))
+        .filter(|edge| edge.kind != Kind::Gap && believed(graph, edge))
         .min_by(|a, b| tightness(a).total_cmp(&tightness(b)))
         .copied()?;
     let hub = best.other(slot)?;
@@ -129,10 +129,9 @@ pub(super) fn merge<const K: usize, const E: usize>(
         let Some(information) = information else {
             continue;
         };
-        let kind = if best.kind == Kind::Chain {
-            edge.kind
-        } else {
-            best.kind
+        let kind = match best.kind {
+            Kind::Loop if edge.kind != Kind::Gap => Kind::Loop,
+            _ => edge.kind,
         };
         put(
             graph,
@@ -203,10 +202,9 @@ fn fused(a: &Edge, b: &Edge) -> Option<Edge> {
     ];
     let [x, y, theta] = sum.solve(b.information.0.times(off))?;
     let motion = Pose::new(a.motion.x + x, a.motion.y + y, a.motion.theta + theta);
-    let kind = if a.kind == Kind::Chain {
-        a.kind
-    } else {
-        b.kind
+    let kind = match (a.kind, b.kind) {
+        (Kind::Chain, _) | (_, Kind::Gap) => a.kind,
+        _ => b.kind,
     };
     Some(Edge {
         kind,
@@ -253,7 +251,7 @@ mod tests {
         let step = Pose::new(1.0, 0.0, 0.5);
         let mut pose = Pose::IDENTITY;
         for _ in 0..3 {
-            graph.add(pose).expect("room");
+            graph.add(pose, 0).expect("room");
             pose = pose * step;
         }
         graph.join(edge(0, 1, step, 0.01)).expect("room");

@@ -13,7 +13,8 @@ use crate::{
 impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: usize>
     Slam<K, E, L, B, V>
 {
-    /// Enters what the keyframe in a slot saw into an occupancy grid; whether there is a keyframe in it.
+    /// Enters what the keyframe in a slot saw into an occupancy grid; whether there is one in it that
+    /// [is in the map](Slam::is_in_map).
     ///
     /// One slot is one slice of work: slots go from 0 up to K. The grid must contain the keyframe's place, else nothing
     /// is entered. At the end [`occupancy::decide`] makes cells free, occupied or unknown.
@@ -23,6 +24,9 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         grid: &mut Grid<S>,
         config: &UpdateConfig,
     ) -> bool {
+        if !self.is_in_map(slot) {
+            return false;
+        }
         let scan = self.scans.get(usize::from(slot));
         let Some((pose, scan)) = self.graph.pose(slot).zip(scan) else {
             return false;
@@ -36,7 +40,9 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
     /// places that they saw it from; `None` without keyframes. Unpacks every keyframe.
     pub fn extent(&mut self, max_range: f32) -> Option<(Point, Point)> {
         let mut found: Option<(Point, Point)> = None;
-        for (slot, node) in self.graph.nodes() {
+        let map = self.graph.oldest_submap();
+        let nodes = self.graph.nodes();
+        for (slot, node) in nodes.filter(|(_, node)| Some(node.submap) == map) {
             if let Some(scan) = self.scans.get(usize::from(slot)) {
                 scan.unpack(&mut self.other);
             }

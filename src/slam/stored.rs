@@ -2,8 +2,8 @@
 //!
 //! | bytes | of a keyframe | | bytes | of an edge |
 //! | --- | --- | --- | --- | --- |
-//! | 2, 4 | slot, number | | 2, 2 | slots it leads from and to |
-//! | 12 | pose (3 × `f32`) | | 2 | 1: a loop |
+//! | 2, 2, 4 | slot, submap, number | | 2, 2 | slots it leads from and to |
+//! | 12 | pose (3 × `f32`) | | 2 | 0: by odometry, 1: a loop, 2: a gap |
 //! | 6 | first bearing, span, step of the range | | 12 | motion (3 × `f32`) |
 //! | 2·B | directions | | 24 | information (6 × `f32`) |
 
@@ -44,7 +44,7 @@ pub(super) struct Counts {
 impl Counts {
     /// Bytes of a map with B directions in a keyframe.
     pub(super) const fn bytes(self, directions: usize) -> u32 {
-        self.nodes as u32 * (24 + 2 * directions as u32) + self.edges as u32 * 42
+        self.nodes as u32 * (26 + 2 * directions as u32) + self.edges as u32 * 42
     }
 }
 
@@ -63,6 +63,7 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
     pub(super) fn write<W: Write>(&self, to: &mut W) -> Result<(), W::Error> {
         for (slot, node) in self.graph.nodes() {
             to.put(&slot.to_le_bytes())?;
+            to.put(&u16::from(node.submap).to_le_bytes())?;
             to.put(&node.id.to_le_bytes())?;
             put_pose(to, node.pose)?;
             let scan = self.scans.get(usize::from(slot));
@@ -71,8 +72,12 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
             }
         }
         for edge in self.graph.edges() {
-            let is_loop = u16::from(edge.kind == Kind::Loop);
-            for word in [edge.from, edge.to, is_loop] {
+            let kind = match edge.kind {
+                Kind::Chain => 0,
+                Kind::Loop => 1,
+                Kind::Gap => 2,
+            };
+            for word in [edge.from, edge.to, kind] {
                 to.put(&word.to_le_bytes())?;
             }
             put_pose(to, edge.motion)?;
@@ -105,11 +110,13 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
     fn read_all<R: Read>(&mut self, counts: Counts, from: &mut R) -> Result<bool, R::Error> {
         for _ in 0..counts.nodes {
             let slot = Slot::from_le_bytes(from.take()?);
+            let submap = u16::from_le_bytes(from.take()?) as u8;
             let id = u32::from_le_bytes(from.take()?);
             let pose = take_pose(from)?;
             let node = Node {
                 pose,
                 id,
+                submap,
                 used: true,
             };
             if !pose.is_finite() || !self.graph.put(slot, node) {
@@ -125,10 +132,11 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         }
         self.graph.set_next_id(counts.next_id);
         for _ in 0..counts.edges {
-            let [from_slot, to, is_loop] = [from.take()?, from.take()?, from.take()?];
-            let kind = match u16::from_le_bytes(is_loop) {
+            let [from_slot, to, kind] = [from.take()?, from.take()?, from.take()?];
+            let kind = match u16::from_le_bytes(kind) {
                 0 => Kind::Chain,
-                _ => Kind::Loop,
+                1 => Kind::Loop,
+                _ => Kind::Gap,
             };
             let motion = take_pose(from)?;
             let mut values = [0.0; 6];

@@ -5,6 +5,7 @@ use heapless::Vec;
 use super::{
     graph::Slot,
     loops::{CANDIDATES, Candidate},
+    recognition::Recognition,
 };
 
 /// What is being done.
@@ -15,12 +16,26 @@ pub(super) enum Work {
     Look(Slot),
     /// They are to be matched.
     Meet(Meeting),
+    /// Keyframes of other submaps that look alike are to be found.
+    Recognize(Recognition),
     /// The graph is being solved.
     Solve,
     /// This keyframe is to be weighed.
     Weigh(Slot),
     /// The keyframe worth least is to be removed, once it is the one that was weighed last.
     Clear(Option<Slot>),
+}
+
+impl Work {
+    /// A keyframe is to be matched with these, the likeliest last.
+    pub(super) const fn meet(slot: Slot, candidates: Vec<Candidate, CANDIDATES>) -> Self {
+        Self::Meet(Meeting {
+            slot,
+            candidates,
+            attempt: 0,
+            is_shown: false,
+        })
+    }
 }
 
 /// A keyframe that is matched with earlier ones.

@@ -89,8 +89,29 @@ pub(super) fn closes<const K: usize, const E: usize>(
     if i.id.abs_diff(k.id) > NEAR || j.id.abs_diff(l.id) > NEAR / 2 {
         return None;
     }
-    let around = i.pose.between(k.pose) * b.motion;
-    let direct = a.motion * j.pose.between(l.pose);
+    Some(is_closed([i, j, k, l].map(|node| node.pose), a, b, config))
+}
+
+/// Whether two matches between the same two submaps say the same of where these are to each other; `None` for others.
+pub(super) fn agree<const K: usize, const E: usize>(
+    graph: &Graph<K, E>,
+    a: &Edge,
+    b: &Edge,
+    config: &SlamConfig,
+) -> Option<bool> {
+    let between = |from, to| graph.are_in_one(from, to);
+    if between(a.from, a.to) || !between(a.from, b.from) || !between(a.to, b.to) {
+        return None;
+    }
+    let pose = |slot| graph.pose(slot);
+    let poses = [pose(a.from)?, pose(a.to)?, pose(b.from)?, pose(b.to)?];
+    Some(is_closed(poses, a, b, config))
+}
+
+/// Whether two matches close a cycle with the poses of their ends, those of `a` first.
+fn is_closed([i, j, k, l]: [Pose; 4], a: &Edge, b: &Edge, config: &SlamConfig) -> bool {
+    let around = i.between(k) * b.motion;
+    let direct = a.motion * j.between(l);
     let gap = around.between(direct);
-    Some(gap.distance() <= config.max_gap && math::abs(gap.theta) <= config.max_heading_gap)
+    gap.distance() <= config.max_gap && math::abs(gap.theta) <= config.max_heading_gap
 }

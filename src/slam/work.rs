@@ -14,6 +14,8 @@ mod cost {
     pub const LOOK: u32 = 2_500;
     /// Showing a keyframe in the virtual scan.
     pub const SHOW: u32 = 10_000;
+    /// Comparing the outlines of some keyframes.
+    pub const RECOGNIZE: u32 = 6_000;
     /// Matching against what is seen there.
     pub const MEET: u32 = 6_000;
     /// Matching where the guess may be far off.
@@ -44,12 +46,8 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
                     Work::Idle => return false,
                     work => work,
                 },
-                Work::Look(slot) => Work::Meet(Meeting {
-                    slot,
-                    candidates: self.candidates(slot),
-                    attempt: 0,
-                    is_shown: false,
-                }),
+                Work::Look(slot) => Work::meet(slot, self.candidates(slot)),
+                Work::Recognize(search) => self.recognize(search),
                 Work::Meet(meeting) => self.go_on(meeting),
                 Work::Solve => self.solve(&mut left),
                 Work::Weigh(slot) => {
@@ -67,6 +65,7 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         match &self.work {
             Work::Idle | Work::Solve => 1,
             Work::Look(_) => cost::LOOK,
+            Work::Recognize(_) => cost::RECOGNIZE,
             Work::Meet(meeting) => match meeting.candidates.last() {
                 Some(_) if !meeting.is_shown => cost::SHOW,
                 Some(candidate) if candidate.is_loose() => cost::MEET_LOOSE,
@@ -98,9 +97,10 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
     /// The next piece of a meeting.
     fn go_on(&mut self, mut meeting: Meeting) -> Work {
         let Some(candidate) = meeting.candidates.last().copied() else {
+            self.join(meeting.slot);
             return Work::Idle;
         };
-        if self.has_loops(meeting.slot) {
+        if !candidate.is_anywhere() && self.has_loops(meeting.slot) {
             return Work::Idle;
         }
         let Some(guess) = candidate.guess(meeting.attempt) else {
@@ -134,6 +134,9 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         if core::mem::take(&mut self.changed) {
             self.solver.start(core::mem::take(&mut self.contradicted));
             return Work::Solve;
+        }
+        if let Some(search) = self.recognition() {
+            return Work::Recognize(search);
         }
         if self.graph.edges().len() + 2 * super::FRESH > E {
             self.thin();

@@ -37,7 +37,7 @@ pub fn run<
 ) -> io::Result<()> {
     let mut input = File::open(INPUT)?;
     let mut output = File::create(OUTPUT)?;
-    let mut longest = 0;
+    let (mut longest, mut pose) = (0, [0; 3]);
     let mut head = [0; 20];
     while read_full(&mut input, &mut head)? {
         let [b0, b1, w0, w1, rest @ ..] = head;
@@ -52,11 +52,12 @@ pub fn run<
             chunk: [0; 9 * CHUNK],
             at: 9 * CHUNK,
         };
-        let mut pose = [0; 3];
         machine.restart();
         tracker.push_scan(beams, |revolution| {
-            let found = revolution.step.pose().unwrap_or_default();
-            pose = [found.x, found.y, found.theta].map(f32::to_bits);
+            // Where the robot was carried the last pose stays, as on the host.
+            if let Some(found) = revolution.step.pose() {
+                pose = [found.x, found.y, found.theta].map(f32::to_bits);
+            }
         });
         let update = machine.instructions();
         machine.restart();

@@ -36,6 +36,39 @@ pub fn ring() -> World {
 /// Along the middle of the corridors.
 pub const ROUND: [[f64; 2]; 4] = [[1.25, 1.25], [22.75, 1.25], [22.75, 16.75], [1.25, 16.75]];
 
+/// Two rooms with the same furniture, 9 m apart, along a corridor without a mark between them.
+#[must_use]
+pub fn twins() -> World {
+    let mut w = World::default();
+    for x in [0.0, 9.0] {
+        w.line([x, 2.0], [x, 7.0]);
+        w.line([x, 7.0], [x + 5.0, 7.0]);
+        w.line([x + 5.0, 7.0], [x + 5.0, 2.0]);
+        w.line([x, 2.0], [x + 1.8, 2.0]);
+        w.line([x + 3.2, 2.0], [x + 5.0, 2.0]);
+        w.turned_block([x + 0.6, 6.3], [1.0, 1.2], 0.0);
+        w.turned_block([x + 4.5, 4.0], [0.8, 1.5], 0.0);
+        w.column([x + 1.0, 3.2], 0.15);
+    }
+    w.line([5.0, 2.0], [9.0, 2.0]);
+    w.line([-1.0, 2.0], [0.0, 2.0]);
+    w.line([14.0, 2.0], [15.0, 2.0]);
+    w.line([-1.0, 0.0], [15.0, 0.0]);
+    w.line([-1.0, 0.0], [-1.0, 2.0]);
+    w.line([15.0, 0.0], [15.0, 2.0]);
+    w
+}
+
+/// Into the first of them, along the corridor, into the second, and out again.
+pub const TWINS: [[f64; 2]; 6] = [
+    [2.5, 1.0],
+    [2.5, 5.0],
+    [2.5, 1.0],
+    [11.5, 1.0],
+    [11.5, 5.0],
+    [11.5, 1.0],
+];
+
 /// A drive round the ring, so many times, with an LD06 and usual wheels, as a log; and the true poses.
 #[must_use]
 pub fn log(rounds: usize, seed: u64) -> (Log, Vec<TruePose>) {

@@ -1,6 +1,7 @@
 //! SLAM: its solver against one in doubles, and whole drives through simulated buildings.
 
 mod building;
+mod carried;
 mod drive;
 mod nonsense;
 mod solver;

@@ -69,9 +69,12 @@ pub fn run(args: &Args, log: &Log, directions: usize) -> Result<Done> {
         loops,
         dropped,
         solved,
+        carried,
+        joined,
     } = map.counters;
     let (scans, kept, bytes) = (map.scans.len(), map.keyframes.len(), map.bytes);
     let measured = map.scans.iter().filter(|scan| scan.is_measured).count();
+    let not_located = map.scans.iter().filter(|scan| !scan.is_located).count();
     let refused = scans - measured;
     let last = map.scans.last().map_or(Pose::IDENTITY, |scan| scan.pose);
     let beams = match tier {
@@ -82,7 +85,8 @@ pub fn run(args: &Args, log: &Log, directions: usize) -> Result<Done> {
         "scans": scans, "refused": refused, "keyframes": keyframes, "lost": 0, "loops": loops,
         "keyframes_kept": kept, "keyframes_pruned": pruned, "keyframes_without_room": no_room,
         "matches_tried": tried, "matches_refused": no_match, "loops_waited": waited, "loops_dropped": dropped,
-        "solved": solved, "slam_bytes": bytes.0, "tier_bytes": bytes.1,
+        "solved": solved, "carried": carried, "joined": joined, "not_located": not_located,
+        "slam_bytes": bytes.0, "tier_bytes": bytes.1,
         "beams": beams, "refused_beams": map.refused_beams,
         "pose_hash": hash.to_string(),
     });
@@ -91,6 +95,7 @@ pub fn run(args: &Args, log: &Log, directions: usize) -> Result<Done> {
     let text = format!(
         "{scans} scans, {refused} refused, {keyframes} keyframes ({kept} kept, {pruned} pruned, {no_room} without room)\n\
          {loops} loops closed and {dropped} dropped of {tried} matches tried; the graph solved {solved} times\n\
+         carried {carried} times, joined again {joined} times; {not_located} scans without a place in the map\n\
          {} bytes of graph, keyframes and working memory; {} with the odometry and a revolution\n\
          last pose {x:.3} m {y:.3} m {:.2}°\npose hash {hash}",
         bytes.0,

@@ -4,10 +4,9 @@ use beamfix::{
     pipeline::{Mapper192k, Mapper512k, Tracker},
     slam::{Slam, Slam192k, SlamConfig},
 };
-use beamfix_sim::world::World;
 
 use super::drive::{drive, path};
-use host_tests::mapping::building::{ROUND, ring};
+use host_tests::mapping::building::{ROUND, TWINS, ring, twins};
 
 #[test]
 fn a_loop_is_closed() {
@@ -43,33 +42,8 @@ fn a_full_memory_goes_on() {
 
 #[test]
 fn two_rooms_alike_are_not_closed_into_one() {
-    // Two rooms with the same furniture, 9 m apart, along a corridor without a mark between them.
-    let mut w = World::default();
-    for x in [0.0, 9.0] {
-        w.line([x, 2.0], [x, 7.0]);
-        w.line([x, 7.0], [x + 5.0, 7.0]);
-        w.line([x + 5.0, 7.0], [x + 5.0, 2.0]);
-        w.line([x, 2.0], [x + 1.8, 2.0]);
-        w.line([x + 3.2, 2.0], [x + 5.0, 2.0]);
-        w.turned_block([x + 0.6, 6.3], [1.0, 1.2], 0.0);
-        w.turned_block([x + 4.5, 4.0], [0.8, 1.5], 0.0);
-        w.column([x + 1.0, 3.2], 0.15);
-    }
-    w.line([5.0, 2.0], [9.0, 2.0]);
-    w.line([-1.0, 2.0], [0.0, 2.0]);
-    w.line([14.0, 2.0], [15.0, 2.0]);
-    w.line([-1.0, 0.0], [15.0, 0.0]);
-    w.line([-1.0, 0.0], [-1.0, 2.0]);
-    w.line([15.0, 0.0], [15.0, 2.0]);
-    let corners = [
-        [2.5, 1.0],
-        [2.5, 5.0],
-        [2.5, 1.0],
-        [11.5, 1.0],
-        [11.5, 5.0],
-        [11.5, 1.0],
-    ];
-    let truth = path(&corners, 2);
+    let w = twins();
+    let truth = path(&TWINS, 2);
     for seed in 0..20 {
         let drift = [0.0, 0.004, -0.004][seed as usize % 3];
         let mut slam = Box::new(Slam192k::new(SlamConfig::DEFAULT));

@@ -40,6 +40,9 @@ pub fn path(corners: &[[f64; 2]], rounds: usize) -> Vec<TruePose> {
 
 /// What became of a drive.
 pub struct Driven {
+    /// Whether each scan is in the map in the end, and was when it came in.
+    pub in_map: Vec<bool>,
+    pub located: Vec<bool>,
     /// Pose of each scan in the end, and by odometry.
     pub mapped: Vec<Pose>,
     pub odometry: Vec<Pose>,
@@ -66,17 +69,46 @@ pub fn drive<const K: usize, const E: usize, const L: usize, const B: usize, con
     drift: f64,
     seed: u64,
 ) -> Driven {
+    drive_and_carry(slam, world, truth, &[], drift, seed)
+}
+
+/// The same; before the poses `carried` the robot is carried there, which odometry knows no more of than that it happened.
+pub fn drive_and_carry<
+    const K: usize,
+    const E: usize,
+    const L: usize,
+    const B: usize,
+    const V: usize,
+>(
+    slam: &mut Slam<K, E, L, B, V>,
+    world: &World,
+    truth: &[TruePose],
+    carried: &[usize],
+    drift: f64,
+    seed: u64,
+) -> Driven {
     let mut noise = Noise::new(seed, 3);
     let narrow = |pose: TruePose| Pose::new(pose.x as f32, pose.y as f32, pose.theta as f32);
     let mut merged = BTreeMap::new();
     let (mut odometry, mut covariance) = (truth[0], Covariance::default());
     let mut placed: Vec<Placed> = Vec::new();
     let mut driven = Driven {
+        in_map: Vec::new(),
+        located: Vec::new(),
         mapped: Vec::new(),
         odometry: Vec::new(),
     };
     for (k, &place) in truth.iter().enumerate() {
-        if k > 0 {
+        if carried.contains(&k) {
+            // What odometry tells that was covered for a second: 2.6 m, and any heading.
+            let Sym3 { xx, yy, tt, .. } = covariance.0;
+            covariance = Covariance(Sym3 {
+                xx: xx + 2.6,
+                yy: yy + 2.6,
+                tt: tt + 3.2,
+                ..covariance.0
+            });
+        } else if k > 0 {
             let motion = truth[k - 1].between(place);
             let length = motion.x.hypot(motion.y);
             let before = odometry;
@@ -109,6 +141,7 @@ pub fn drive<const K: usize, const E: usize, const L: usize, const B: usize, con
         let at = slam.update(narrow(odometry), &covariance, Pose::IDENTITY, &points);
         placed.push(at.expect("a keyframe"));
         driven.odometry.push(narrow(odometry));
+        driven.located.push(slam.is_located());
         slam.step(50_000);
         note(slam, &mut merged);
     }
@@ -122,6 +155,10 @@ pub fn drive<const K: usize, const E: usize, const L: usize, const B: usize, con
                 motion: *motion * at.motion,
             };
         }
+        let mut nodes = slam.graph().nodes();
+        let node = nodes.find(|(_, node)| node.id == at.keyframe);
+        let is_in_map = node.is_some_and(|(slot, _)| slam.is_in_map(slot));
+        driven.in_map.push(is_in_map);
         driven
             .mapped
             .push(slam.pose(&at).expect("a keyframe that is there"));

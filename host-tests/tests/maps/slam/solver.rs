@@ -54,11 +54,11 @@ fn graph_of(kind: Kind, loops: usize, wrong: usize, seed: u64) -> Box<Small> {
     let mut graph = Box::new(Small::new());
     let start = truth(0);
     let mut pose = Pose::new(start.x as f32, start.y as f32, start.theta as f32);
-    graph.add(pose).expect("room");
+    graph.add(pose, 0).expect("room");
     for k in 1..NODES {
         let step = edge(k - 1, k, CHAIN, Kind::Chain, &mut noise);
         pose = pose * step.motion;
-        graph.add(pose).expect("room");
+        graph.add(pose, 0).expect("room");
         graph.join(step).expect("room");
     }
     for n in 0..loops + wrong {
@@ -236,8 +236,8 @@ fn a_graph_too_dense_for_the_memory_is_refused() {
 #[test]
 fn what_is_no_edge_is_given_back() {
     let mut graph = Box::new(Small::new());
-    graph.add(Pose::IDENTITY).expect("room");
-    graph.add(Pose::IDENTITY).expect("room");
+    graph.add(Pose::IDENTITY, 0).expect("room");
+    graph.add(Pose::IDENTITY, 0).expect("room");
     assert_eq!(
         graph.add(Pose {
             x: f32::NAN,
