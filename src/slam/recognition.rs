@@ -8,8 +8,8 @@ use heapless::Vec;
 use super::{
     Slam,
     graph::Slot,
-    loops::{CANDIDATES, Candidate},
-    task::Work,
+    loops::Candidate,
+    task::{Recognition, Work},
 };
 use crate::{geometry::Pose, scan::ScanPoint};
 
@@ -76,17 +76,6 @@ const fn logarithm(range: u16) -> u8 {
     // The fraction by its first four bits: off by less than a sixteenth and a half.
     let fraction = ((range << 4) >> octave) & 15;
     (16 * octave + fraction + 1) as u8
-}
-
-/// A search for the place of a keyframe among those of other submaps.
-#[derive(Debug, Clone)]
-pub(super) struct Recognition {
-    /// The keyframe.
-    slot: Slot,
-    /// The next slot to be compared.
-    next: Slot,
-    /// The likeliest so far, best first: difference, slot, rotation.
-    best: Vec<(u32, Slot, u8), CANDIDATES>,
 }
 
 impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: usize>

@@ -5,7 +5,6 @@ use heapless::Vec;
 use super::{
     graph::Slot,
     loops::{CANDIDATES, Candidate},
-    recognition::Recognition,
 };
 
 /// What is being done.
@@ -36,6 +35,17 @@ impl Work {
             is_shown: false,
         })
     }
+}
+
+/// A search for the place of a keyframe among those of other submaps.
+#[derive(Debug, Clone)]
+pub(super) struct Recognition {
+    /// The keyframe.
+    pub slot: Slot,
+    /// The next slot to be compared.
+    pub next: Slot,
+    /// The likeliest so far, best first: difference, slot, rotation.
+    pub best: Vec<(u32, Slot, u8), CANDIDATES>,
 }
 
 /// A keyframe that is matched with earlier ones.
