@@ -138,6 +138,8 @@ class Program:
                         target = (upper[base] + int(offset or "0", 0)) & 0xFFFF_FFFF
                     elif base not in ("ra", "t0"):
                         indirect = True
+                    # A call leaves its return address there: what follows is a return.
+                    upper.pop("ra", None)
             deepest = max(deepest, depth)
             if target is not None and not start <= target < end:
                 calls.add(target)
