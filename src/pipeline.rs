@@ -151,6 +151,12 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
         }
     }
 
+    /// The packet that the bytes pushed last have completed.
+    #[cfg(feature = "internals")]
+    pub const fn packet(&self) -> Option<&P::Packet> {
+        self.packet.as_ref()
+    }
+
     /// The parser, for its counters.
     pub const fn lidar(&self) -> &P {
         &self.lidar

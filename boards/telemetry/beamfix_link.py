@@ -20,19 +20,21 @@ import json
 import struct
 import sys
 
-VERSION = 5
+VERSION = 6
 
 VERDICTS = [
     "Measured", "Keyframe", "First", "TooFewBeams", "TooFewLines", "TooFewCorrespondences", "Degenerate", "NotConverged",
     "Ambiguous", "TooFar", "Refused", "NothingFound", "Unlikely", "BadGuess", "BadConfig",
+    "Doubtful", "Searching", "Choosing",
 ]
 RESETS = ["Power", "Watchdog", "Other"]
-LIDAR_STATES = ["Unknown", "Silent", "Noise", "Standing", "Turning", "Blind"]
+LIDAR_STATES = ["Unknown", "Silent", "Noise", "Standing", "Turning", "Blind", "Starting", "Defective"]
+TASKS = ["Odometry", "Localization"]
 MOTOR_STATES = ["Free", "SpinningUp", "Steady", "Off"]
 
 
 # How each message is laid out. u8, bool: a byte; u16, u32: a varint; f32: four bytes; a list of names: a varint that numbers them;
-# ("array", n, of), ("list", of), ("option", of), ("result", ok, error), {name: of} for what has fields.
+# ("array", n, of), ("list", of), text: a list of u8, ("option", of), ("result", ok, error), {name: of} for what has fields.
 _WEAK = {"direction": ("array", 3, "f32"), "sigma": "f32", "lever": "f32"}
 _FOUND = {
     "score": "f32", "inliers": "u16", "overlap": "u16", "beams": "u16", "residual": "f32", "covariance": ("array", 6, "f32"),
@@ -40,7 +42,7 @@ _FOUND = {
 }
 MESSAGES = [
     ("Ready", {"version": "u8", "beams": "u16", "reset": RESETS,
-               "mount": {"pose": ("array", 3, "f32"), "upside_down": "bool"}}),
+               "mount": {"pose": ("array", 3, "f32"), "upside_down": "bool"}, "lidar": "text", "task": TASKS}),
     ("Pose", {"sequence": "u16", "time_us": "u32", "pose": ("array", 3, "f32"), "covariance": ("array", 6, "f32"),
               "verdict": VERDICTS, "inliers": "u16", "beams": "u16", "residual": "f32"}),
     ("Health", {"packets": "u32", "check_errors": "u32", "skipped_bytes": "u32", "beams_refused": "u32",
@@ -152,6 +154,8 @@ class _Reader:
                 return self.read(layout[1]) if self.read("bool") else None
             number = self.varint(32)
             return {["Ok", "Err"][number]: self.read(layout[1 + number])} if number < 2 else self.read([])
+        if layout == "text":
+            return bytes(self.take(self.varint(32))).decode("utf-8", "replace")
         if layout == "f32":
             return struct.unpack("<f", self.take(4))[0]
         if layout in ("u16", "u32"):
@@ -250,6 +254,11 @@ def send(raw=False, scans=False, quality=False):
 def gyro(rate):
     """The command that tells the robot's rate of turn now, counter-clockwise (rad/s). Twenty a second or more."""
     return frame(b"\5" + struct.pack("<f", rate))
+
+
+def start_at(x, y, theta):
+    """The command that tells where the robot is in the map: m, m, rad."""
+    return frame(b"\6" + struct.pack("<fff", x, y, theta))
 
 
 def main(arguments):

@@ -181,6 +181,7 @@ impl<W: Write> Watch<W> {
                 // A board that was not heard starting: as if the lidar sat at the robot's centre, looking forward.
                 let mount = self
                     .ready
+                    .as_ref()
                     .map_or(Mount::DEFAULT, |ready| ready.mount.mount());
                 for (k, (bearing, mm)) in piece.beams().enumerate() {
                     if piece.turn_start == Some(k as u8) {

@@ -1,30 +1,23 @@
 //! Settings of the firmware's application.
 
 use beamfix::{
-    lidar::{Model, motor::MotorConfig},
+    lidar::{Model, Motor, motor::MotorConfig},
     odometry::OdometryConfig,
 };
 
+use crate::lidars::same;
 #[cfg(feature = "mavlink")]
 use crate::mavlink::Autopilot;
 
-/// The settings of all boards: change them here. One that is out of its range does not compile.
-pub const CONFIG: AppConfig = checked(AppConfig::DEFAULT);
-
-/// The same settings; in a `const`, those that cannot be used do not compile.
-const fn checked(config: AppConfig) -> AppConfig {
-    match config.odometry.checked() {
-        Ok(_) => config,
-        Err(_) => panic!("a setting of the odometry is out of its range"),
-    }
-}
+/// The settings for an LD06 at the robot's centre.
+pub const CONFIG: AppConfig = AppConfig::DEFAULT.checked();
 
 /// Settings of [`App`](crate::App).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AppConfig {
-    /// The lidar: how far it sees. Default: an LD06.
+    /// The lidar: the speed of its line, how it is started, how fast it turns, how far it sees. Default: an LD06.
     pub lidar: &'static Model,
-    /// How the lidar sits on the robot, what is believed and what is not.
+    /// How the lidar sits on the robot, what is believed and what is not. Localization takes the points' part of it.
     pub odometry: OdometryConfig,
     /// What is sent. Default: frames.
     pub output: Output,
@@ -55,12 +48,22 @@ impl AppConfig {
         record: false,
         scans: false,
         quality: false,
-        motor: Some(MotorConfig {
-            initial_duty: 0.5,
-            spin_up_ms: 5000,
-            ..MotorConfig::LDROBOT_LD06
-        }),
+        motor: motor(&Model::LDROBOT_LD06),
     };
+
+    /// A lidar of this model at the robot's centre, frames out.
+    #[must_use]
+    pub const fn for_model(model: &'static Model) -> Self {
+        if same(model.name, Model::LDROBOT_LD06.name) {
+            return Self::DEFAULT;
+        }
+        Self {
+            lidar: model,
+            odometry: OdometryConfig::for_model(model),
+            motor: motor(model),
+            ..Self::DEFAULT
+        }
+    }
 
     /// For a board's features of these names: lines for a terminal in the demo, MAVLink where this crate has it.
     #[must_use]
@@ -73,6 +76,36 @@ impl AppConfig {
         };
         Self { output, ..self }
     }
+
+    /// The same; in a `const`, settings that cannot be used do not compile.
+    ///
+    /// # Panics
+    ///
+    /// Where one is out of its range.
+    #[must_use]
+    pub const fn checked(self) -> Self {
+        match self.odometry.checked() {
+            Ok(_) => self,
+            Err(_) => panic!("a setting of the odometry is out of its range"),
+        }
+    }
+}
+
+/// How a lidar's motor is driven by a PWM line, where it can be.
+const fn motor(model: &Model) -> Option<MotorConfig> {
+    let config = match model.motor {
+        Motor::OwnOrPwm => MotorConfig {
+            initial_duty: 0.5,
+            spin_up_ms: 5000,
+            ..MotorConfig::LDROBOT_LD06
+        },
+        Motor::Pwm => MotorConfig::NEATO_XV11,
+        _ => return None,
+    };
+    Some(MotorConfig {
+        target_rpm: 6.0 * model.revolutions_per_10s as f32,
+        ..config
+    })
 }
 
 /// What is sent.

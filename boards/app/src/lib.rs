@@ -5,22 +5,27 @@
 //! command(bytes) ─▶ wheels, gyroscope, beams of other sensors
 //! ```
 //!
-//! [`App`] does no I/O, so the host runs the very code that the boards run; a board moves bytes between its UARTs
-//! and these functions, and sleeps in between: [`run`] does that for every board with interrupts.
+//! [`Firmware`] does no I/O, so the host runs the very code that the boards run; a board moves bytes between its UARTs
+//! and these functions, and sleeps in between: [`run`] does that for every board with interrupts. Which lidar and which
+//! task are types: [`lidars`], [`task`].
 #![no_std]
 
 mod config;
+pub mod lidars;
+pub mod map;
 #[cfg(feature = "mavlink")]
 pub mod mavlink;
 mod report;
 pub mod ring;
 pub mod run;
+pub mod starter;
 pub mod supervisor;
+pub mod task;
 pub mod text;
 
 use beamfix::{
     geometry::Pose,
-    lidar::{Protocol as _, ld06},
+    lidar::{Protocol, parsers},
     odometry::Odometry,
     pipeline::Pipeline,
 };
@@ -29,32 +34,36 @@ use heapless::Vec;
 use command::Command;
 use report::Report;
 use supervisor::{Care, Seen};
+use task::Task;
 use telemetry::{Health, Raw, Ready, Reset, Telemetry};
 
 pub use beamfix_telemetry::{VERSION, command, link, telemetry};
 pub use config::{AppConfig, CONFIG, Output};
+pub use lidars::{Lidar, OdometryWith, Row, chosen};
 
-/// What the lidar sends at.
-pub const LIDAR_BAUD: u32 = 230_400;
+/// What an LD06 sends at.
+pub const LIDAR_BAUD: u32 = CONFIG.lidar.baud;
 /// What frames leave at and commands come in at: a recording with everything switched on takes half of it.
 pub const TELEMETRY_BAUD: u32 = 921_600;
 /// Bytes of the lidar that come in within this time of each other count as coming in together (µs), so that a recording
 /// can say when that was.
 const PIECE_US: u32 = 2_000;
 
-/// Most beams of a revolution; further ones are refused and counted. An LD06 sends 450 at 10 Hz.
+/// Most beams of an LD06's revolution; further ones are refused and counted. It sends 450 at 10 Hz.
 pub const BEAMS: usize = 456;
 /// The same on a board with 16 KB of RAM: the last 38 of a revolution, 30°, are given up so that the stack fits too.
 pub const SMALL_BEAMS: usize = 412;
 
-/// The application as the boards run it.
+/// The application with an LD06 and odometry.
+pub type App<const N: usize> = Firmware<parsers::Ldrobot, Odometry<N>, N>;
+/// The same as the boards run it.
 pub type Board = App<BEAMS>;
 /// The same on a board with 16 KB of RAM.
 pub type SmallBoard = App<SMALL_BEAMS>;
 
-/// What a board runs. N is the most beams a revolution may have.
-pub struct App<const N: usize> {
-    pipeline: Pipeline<ld06::Parser, Odometry<N>, N>,
+/// The application with any lidar and any task: P reads the lidar's bytes, E finds the poses, N is the most beams a revolution may have.
+pub struct Firmware<P: Protocol, E, const N: usize> {
+    pipeline: Pipeline<P, E, N>,
     commands: link::Receiver,
     /// The bytes of the lidar that came in last, together, and when.
     piece: Raw,
@@ -67,15 +76,31 @@ impl<const N: usize> App<N> {
     /// Waits for the first whole revolution.
     #[must_use]
     pub const fn new(config: AppConfig) -> Self {
+        Self::odometry(config, parsers::Ldrobot::new())
+    }
+}
+
+impl<P: Protocol, const N: usize> Firmware<P, Odometry<N>, N> {
+    /// Tells the pose since the start, by the lidar that `lidar` reads: the settings' one.
+    #[must_use]
+    pub const fn odometry(config: AppConfig, lidar: P) -> Self {
+        Self::with_task(&config, lidar, Odometry::new(config.odometry))
+    }
+}
+
+impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
+    /// Does this task with the lidar that `lidar` reads: the settings' one.
+    #[must_use]
+    pub const fn with_task(config: &AppConfig, lidar: P, task: E) -> Self {
         Self {
-            pipeline: Pipeline::new(ld06::Parser::new(), Odometry::new(config.odometry)),
+            pipeline: Pipeline::new(lidar, task),
             commands: link::Receiver::new(),
             piece: Raw {
                 time_us: 0,
                 bytes: Vec::new(),
             },
             lidar_bytes: 0,
-            report: Report::new(&config),
+            report: Report::new(config),
         }
     }
 
@@ -87,6 +112,8 @@ impl<const N: usize> App<N> {
             beams: N as u16,
             reset,
             mount: self.report.mount,
+            lidar: self.report.lidar.try_into().unwrap_or_default(),
+            task: E::KIND,
         };
         self.report.send(&Telemetry::Ready(ready));
         &self.report.out
@@ -122,8 +149,12 @@ impl<const N: usize> App<N> {
     /// The byte that completes a revolution costs a match; a board must buffer what comes meanwhile.
     pub fn lidar(&mut self, bytes: &[u8]) -> (usize, &[u8]) {
         self.report.out.clear();
+        self.send_rest_of_scan();
         let mut taken = 0;
         while let Some(rest) = bytes.get(taken..).filter(|rest| !rest.is_empty()) {
+            if !self.report.out.is_empty() {
+                break;
+            }
             let room = self.room_in_piece();
             if !self.report.out.is_empty() {
                 break;
@@ -132,9 +163,6 @@ impl<const N: usize> App<N> {
             let count = self.pipeline.push_packet(part, &mut self.report);
             let _ = (self.piece.bytes).extend_from_slice(part.get(..count).unwrap_or_default());
             taken += count;
-            if !self.report.out.is_empty() {
-                break;
-            }
         }
         self.lidar_bytes = self.lidar_bytes.wrapping_add(taken as u32);
         (taken, self.health_when_due())
@@ -147,6 +175,13 @@ impl<const N: usize> App<N> {
             let (taken, sent) = self.lidar(rest);
             send(sent);
             rest = rest.get(taken..).unwrap_or_default();
+        }
+    }
+
+    /// Sends the next beams of a packet that has more than one message holds, where they are asked for.
+    fn send_rest_of_scan(&mut self) {
+        if let (1.., Some(packet)) = (self.report.scan_at, self.pipeline.packet()) {
+            self.report.send_piece(packet);
         }
     }
 
@@ -234,6 +269,10 @@ impl<const N: usize> App<N> {
                     self.report.health_due = true;
                 }
             }
+            Some(Command::StartAt { x, y, theta }) => {
+                let estimator = self.pipeline.tracker_mut().estimator_mut();
+                estimator.start_at(Pose::new(x, y, theta));
+            }
             Some(Command::Send {
                 raw,
                 scans,
@@ -248,13 +287,19 @@ impl<const N: usize> App<N> {
         true
     }
 
-    /// Where the robot is.
-    #[must_use]
-    pub fn pose(&self) -> Pose {
-        self.odometry().pose()
+    /// Does a part of what the task puts off, about so many bytes looked up; true where nothing is left to do before the
+    /// next revolution. Only a search in a map puts something off.
+    pub fn work(&mut self, budget: u32) -> bool {
+        self.pipeline.tracker_mut().estimator_mut().work(budget)
     }
 
-    fn odometry(&self) -> &Odometry<N> {
+    /// Where the robot is; all zeros where nobody knows.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        self.task().pose().unwrap_or(Pose::IDENTITY)
+    }
+
+    fn task(&self) -> &E {
         self.pipeline.tracker().estimator()
     }
 
@@ -264,8 +309,9 @@ impl<const N: usize> App<N> {
         Seen {
             bytes: self.lidar_bytes.wrapping_add(self.report.bytes_lost),
             packets: self.pipeline.lidar().counters().packets,
-            turns: self.odometry().counters().scans,
-            speed_deg_per_s: self.report.speed_deg_per_s,
+            turns: self.report.turns,
+            rpm: self.report.rpm,
+            tells_rpm: self.report.tells_rpm,
             blind_turns: self.report.blind_turns,
         }
     }
@@ -301,7 +347,7 @@ impl<const N: usize> App<N> {
             check_errors: lidar.check_errors,
             skipped_bytes: lidar.skipped_bytes,
             beams_refused: self.pipeline.tracker().refused_beams(),
-            matches_refused: self.odometry().counters().refused,
+            matches_refused: self.task().refused(),
             commands: commands.frames,
             command_errors: commands.errors,
             bytes_lost: self.report.bytes_lost,

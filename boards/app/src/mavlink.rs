@@ -57,6 +57,8 @@ pub struct Link {
     sequence: u8,
     now_us: u64,
     heartbeat_due_us: u64,
+    /// The last pose, if it was known, and its time by the lidar's clock (µs).
+    last: Option<(Placed, u32)>,
 }
 
 impl Link {
@@ -68,6 +70,7 @@ impl Link {
             sequence: 0,
             now_us: 0,
             heartbeat_due_us: 0,
+            last: None,
         }
     }
 
@@ -107,6 +110,18 @@ impl Link {
         self.send(&heartbeat, out);
     }
 
+    /// The velocity from the last pose to this one, for what tells none itself; remembers the pose, if it is known.
+    fn velocity(&mut self, pose: &Pose, is_known: bool) -> Option<Twist> {
+        let [x, y, theta] = pose.pose;
+        let now = Placed::new(x, y, theta);
+        let last = core::mem::replace(&mut self.last, is_known.then_some((now, pose.time_us)));
+        let (last, last_us) = last.filter(|_| is_known)?;
+        let passed_us = pose.time_us.wrapping_sub(last_us);
+        (1..1_000_000)
+            .contains(&passed_us)
+            .then(|| Twist::from_motion(last.between(now), passed_us as f32 * 1e-6))
+    }
+
     /// Appends a pose and the obstacles of its scan.
     #[inline(never)]
     pub fn append<const N: usize, const B: usize>(
@@ -117,7 +132,13 @@ impl Link {
         out: &mut Vec<u8, B>,
     ) {
         let time_us = self.now_us;
-        self.send(&odometry(step, time_us), out);
+        // A pose that nobody knows is no pose, and a velocity of 0 that nobody knows would be believed.
+        let known = !matches!(step.pose.verdict, Verdict::Searching | Verdict::Choosing);
+        let between = self.velocity(&step.pose, known);
+        let twist = step.twist.or(between);
+        if known && twist.is_some() {
+            self.send(&odometry(&Told { twist, ..*step }, time_us), out);
+        }
         self.send(&obstacles(scan, limits, time_us), out);
     }
 
@@ -154,8 +175,8 @@ impl Link {
 pub struct Told {
     /// The pose as the frames have it.
     pub pose: Pose,
-    /// The robot's velocity.
-    pub twist: Twist,
+    /// The robot's velocity; where the task tells none, a [`Link`] has it from two poses.
+    pub twist: Option<Twist>,
     /// Times that the pose may have jumped, wrapping.
     pub resets: u8,
     /// Who listens.
@@ -205,6 +226,7 @@ pub fn odometry(told: &Told, time_usec: u64) -> ODOMETRY_DATA {
         resets,
         autopilot,
     } = told;
+    let twist = twist.unwrap_or(Twist::ZERO);
     let [x, y, theta] = pose.pose;
     let [xx, xy, yy, xt, yt, tt] = pose.covariance;
     let (sin, cos) = math::sin_cos(-0.5 * theta);

@@ -3,8 +3,7 @@
 #[cfg(feature = "truth")]
 use beamfix::geometry::Pose;
 use beamfix::{
-    lidar::{Packet as _, ld06},
-    odometry::{Odometry, Step},
+    lidar::Packet,
     pipeline::{Revolution, Sink},
 };
 use heapless::Vec;
@@ -16,12 +15,13 @@ use crate::telemetry::Truth;
 use crate::{
     AppConfig, Output, link,
     supervisor::Care,
-    telemetry::{self, Gyro, Mounted, Piece, Quality, Raw, Telemetry, Verdict, Wheels},
+    task::{Task, Told},
+    telemetry::{self, Gyro, Mounted, PIECE, Piece, Raw, Telemetry, Wheels},
     text,
 };
 
 /// Revolutions between two health messages.
-const HEALTH_EVERY: u16 = 16;
+const HEALTH_EVERY: u32 = 16;
 /// Questions that are answered between two revolutions or ticks: an answer is eleven times as long as its question, so that a
 /// flood of them would fill the line and leave no time for the lidar.
 const ANSWERS: u8 = 2;
@@ -41,13 +41,21 @@ pub(crate) struct Report {
     /// When the last pose was, until its error was told.
     #[cfg(feature = "truth")]
     pub pose_us: Option<u32>,
-    /// The motor's speed by the last good packet.
-    pub speed_deg_per_s: u16,
-    pub sequence: u16,
+    /// The motor's speed: by the last good packet, where packets tell it, else by the time of the last revolution.
+    pub rpm: f32,
+    pub tells_rpm: bool,
+    /// End of the last revolution.
+    end_us: u32,
+    /// Revolutions that went through the matcher; wraps.
+    pub turns: u32,
+    /// The beam of the packet at hand that is to be sent next; 0 for none.
+    pub scan_at: u16,
     pub bytes_lost: u32,
     pub care: Care,
     pub health_due: bool,
     pub mount: Mounted,
+    /// Name of its model.
+    pub lidar: &'static str,
     /// Questions answered since the last revolution or tick.
     answers: u8,
     /// Revolutions in a row with too few beams to be matched.
@@ -59,13 +67,16 @@ pub(crate) struct Report {
     pub out: Vec<u8, OUT>,
 }
 
-impl<const N: usize> Sink<ld06::Packet, Odometry<N>, N> for Report {
-    fn revolution(&mut self, revolution: Revolution<'_, Odometry<N>, N>) {
+impl<P: Packet, E: Task<N>, const N: usize> Sink<P, E, N> for Report {
+    fn revolution(&mut self, revolution: Revolution<'_, E, N>) {
         self.step(&revolution);
     }
 
-    fn packet(&mut self, packet: &ld06::Packet) {
-        self.speed_deg_per_s = packet.speed_deg_per_s;
+    fn packet(&mut self, packet: &P) {
+        if let Some(rpm) = packet.speed_rpm() {
+            (self.rpm, self.tells_rpm) = (rpm, true);
+        }
+        self.scan_at = 0;
         if self.scans {
             self.send_piece(packet);
         }
@@ -83,10 +94,14 @@ impl Report {
             now_us: 0,
             #[cfg(feature = "truth")]
             pose_us: None,
-            speed_deg_per_s: 0,
-            sequence: 0,
+            rpm: 0.0,
+            tells_rpm: false,
+            end_us: 0,
+            turns: 0,
+            scan_at: 0,
             health_due: false,
             mount: Mounted::of(&config.odometry.points.mount),
+            lidar: config.lidar.name,
             answers: 0,
             blind_turns: 0,
             #[cfg(feature = "mavlink")]
@@ -124,19 +139,23 @@ impl Report {
 
     /// Apart, so that its memory is not on the stack during the match.
     #[inline(never)]
-    pub fn step<const N: usize>(&mut self, revolution: &Revolution<'_, Odometry<N>, N>) {
+    pub fn step<E: Task<N>, const N: usize>(&mut self, revolution: &Revolution<'_, E, N>) {
         let time_us = revolution.scan.end_us();
-        let pose = frame(self.sequence, time_us, revolution.step);
-        self.sequence = self.sequence.wrapping_add(1);
+        let pose = frame(self.turns as u16, time_us, &E::told(revolution.step));
+        if !self.tells_rpm {
+            self.rpm = 60e6 / time_us.wrapping_sub(self.end_us) as f32;
+        }
+        self.end_us = time_us;
+        self.turns = self.turns.wrapping_add(1);
         self.answers = 0;
-        self.blind_turns = match pose.verdict {
-            Verdict::First | Verdict::TooFewBeams => self.blind_turns.saturating_add(1),
-            _ => 0,
+        self.blind_turns = match E::is_blind(revolution.step, revolution.scan) {
+            true => self.blind_turns.saturating_add(1),
+            false => 0,
         };
-        self.health_due |= self.sequence.is_multiple_of(HEALTH_EVERY);
+        self.health_due |= self.turns.is_multiple_of(HEALTH_EVERY);
         self.send(&Telemetry::Pose(pose));
         if self.quality {
-            self.send_quality(pose.sequence, revolution.step);
+            self.send_quality::<E, N>(pose.sequence, revolution.step);
         }
         #[cfg(feature = "truth")]
         {
@@ -147,7 +166,7 @@ impl Report {
             let told = mavlink::Told {
                 pose,
                 twist: revolution.estimator.twist(),
-                resets: revolution.estimator.counters().lost as u8,
+                resets: revolution.estimator.lost() as u8,
                 autopilot: self.config.autopilot,
             };
             let limits = mavlink::Limits::of(&self.config);
@@ -180,20 +199,31 @@ impl Report {
     }
 
     #[inline(never)]
-    fn send_quality(&mut self, sequence: u16, step: &Step) {
-        self.send(&Telemetry::Quality(Quality::of(sequence, step)));
+    fn send_quality<E: Task<N>, const N: usize>(&mut self, sequence: u16, step: &E::Step) {
+        if let Some(quality) = E::quality(sequence, step) {
+            self.send(&Telemetry::Quality(quality));
+        }
     }
 
+    /// Sends the next beams of a packet; the rest waits for the next call.
     #[inline(never)]
-    fn send_piece(&mut self, packet: &ld06::Packet) {
+    pub fn send_piece(&mut self, packet: &impl Packet) {
+        let at = usize::from(self.scan_at);
         let start = packet.revolution_start();
-        self.send(&Telemetry::Scan(Piece::of(packet, start)));
+        let start = start.and_then(|start| start.checked_sub(at));
+        let mut beams = packet.beams().skip(at);
+        let piece = Piece::of(beams.by_ref().take(PIECE), start);
+        self.scan_at = match beams.next() {
+            Some(_) => self.scan_at + PIECE as u16,
+            None => 0,
+        };
+        self.send(&Telemetry::Scan(piece));
     }
 
     #[cfg(feature = "truth")]
     #[inline(never)]
     pub fn send_truth(&mut self, truth: Pose, pose: Pose) {
-        let sequence = self.sequence.wrapping_sub(1);
+        let sequence = (self.turns as u16).wrapping_sub(1);
         let message = Truth {
             sequence,
             pose: [truth.x, truth.y, truth.theta],
@@ -228,19 +258,15 @@ impl Report {
 }
 
 /// A step as it is sent.
-fn frame(sequence: u16, time_us: u32, step: &Step) -> telemetry::Pose {
-    let (inliers, beams, residual) = match &step.outcome {
-        Ok(found) => (found.inliers, found.beams, found.residual),
-        Err(_) => (0, 0, 0.0),
-    };
+fn frame(sequence: u16, time_us: u32, told: &Told) -> telemetry::Pose {
     telemetry::Pose {
         sequence,
         time_us,
-        pose: [step.pose.x, step.pose.y, step.pose.theta],
-        covariance: step.covariance.to_array(),
-        verdict: Verdict::of(step),
-        inliers,
-        beams,
-        residual,
+        pose: [told.pose.x, told.pose.y, told.pose.theta],
+        covariance: told.covariance,
+        verdict: told.verdict,
+        inliers: told.inliers,
+        beams: told.beams,
+        residual: told.residual,
     }
 }

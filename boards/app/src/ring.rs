@@ -33,6 +33,18 @@ impl<const B: usize> Ring<B> {
         });
     }
 
+    /// Keeps bytes, as many as have room, and counts the others as lost: in one critical section, whose length grows with them.
+    pub fn extend(&self, bytes: &[u8]) {
+        self.with(|ring| {
+            let free = ring.bytes.capacity() - ring.bytes.len();
+            let (kept, lost) = bytes.split_at(bytes.len().min(free));
+            for &byte in kept {
+                let _ = ring.bytes.push_back(byte);
+            }
+            ring.lost = ring.lost.wrapping_add(lost.len() as u32);
+        });
+    }
+
     /// Counts bytes that were lost before they came here: overruns of the UART.
     pub fn lose(&self, bytes: u32) {
         self.with(|ring| ring.lost = ring.lost.wrapping_add(bytes));

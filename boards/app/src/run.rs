@@ -1,19 +1,27 @@
 //! The main loop of every board with interrupts.
 
+use beamfix::{geometry::Pose, lidar::Protocol};
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 
 use crate::{
-    App, AppConfig,
+    AppConfig, Firmware,
     ring::Ring,
+    starter::{Starter, Wanted},
     supervisor::{self, Supervisor},
+    task::Task,
     telemetry::Reset,
 };
 
+/// Bytes of the map that are looked up at a time in a search, about: 100 000 to 200 000 instructions, a few milliseconds.
+pub const WORK: u32 = 10_000;
 /// Most bytes that are taken from a ring at a time: what an LD06 sends in 1.4 ms.
 const PIECE: usize = 32;
 
 /// What the loop needs of a board besides its interrupts, which fill the two rings.
 pub trait Hardware {
+    /// Whether the board has a line to the lidar, and starts one that must be asked. Without it, no code for that is linked.
+    const ASKS: bool = false;
+
     /// Why the board has started.
     fn reset(&mut self) -> Reset {
         Reset::Other
@@ -25,6 +33,17 @@ pub trait Hardware {
     /// Sends bytes, waiting as long as it takes.
     fn send(&mut self, bytes: &[u8]);
 
+    /// Sends bytes to the lidar, waiting until the last one has left; where the board [`Hardware::ASKS`].
+    fn send_to_lidar(&mut self, bytes: &[u8]) {
+        let _ = bytes;
+    }
+
+    /// Sets the lidar's line to so many bits a second; at the start it is at that of the lidar's model. Where the board
+    /// [`Hardware::ASKS`].
+    fn set_lidar_baud(&mut self, baud: u32) {
+        let _ = baud;
+    }
+
     /// Keeps the board from being reset; called only while something goes on.
     fn feed_watchdog(&mut self);
 
@@ -32,7 +51,7 @@ pub trait Hardware {
     fn wait(&mut self);
 
     /// Something was sent; `pose` is where the robot is.
-    fn log(&mut self, pose: beamfix::geometry::Pose) {
+    fn log(&mut self, pose: Pose) {
         let _ = pose;
     }
 
@@ -43,7 +62,7 @@ pub trait Hardware {
 
     /// Where it is simulated: the true pose of the robot at a time of the lidar's clock (µs, wrapping).
     #[cfg(feature = "truth")]
-    fn truth(&mut self, time_us: u32) -> Option<beamfix::geometry::Pose> {
+    fn truth(&mut self, time_us: u32) -> Option<Pose> {
         let _ = time_us;
         None
     }
@@ -52,68 +71,103 @@ pub trait Hardware {
 /// Runs the application for ever.
 ///
 /// The board must wake up by itself now and then (a timer's interrupt), or a silent lidar would look like a hang.
-pub fn run<const N: usize, const L: usize, const C: usize>(
-    app: &mut App<N>,
+pub fn run<P: Protocol, E: Task<N>, const N: usize, const L: usize, const C: usize>(
+    app: &mut Firmware<P, E, N>,
     config: &AppConfig,
-    (lidar, commands): (&Ring<L>, &Ring<C>),
+    rings: (&Ring<L>, &Ring<C>),
     mut hardware: impl Hardware,
     pwm: impl SetDutyCycle,
 ) -> ! {
-    let mut supervisor = Supervisor::new(pwm, config.motor, hardware.now_us());
+    let mut supervisor = Supervisor::new(pwm, config, hardware.now_us());
+    let mut starter = Starter::new(config.lidar);
     let reset = hardware.reset();
     hardware.send(app.ready(reset));
     loop {
-        let now_us = hardware.now_us();
-        app.set_time(now_us);
-        hardware.simulate(now_us, lidar);
-        if supervisor.is_due(now_us) {
-            let care = supervisor.look(now_us, app.seen());
-            app.set_care(care);
-            if care.progress {
-                hardware.feed_watchdog();
-            }
-            let due = app.tick();
-            if !due.is_empty() {
-                hardware.send(due);
+        go_round(app, rings, &mut hardware, &mut supervisor, &mut starter);
+    }
+}
+
+/// Once through everything that can be due.
+#[inline(always)]
+fn go_round<
+    H: Hardware,
+    P: Protocol,
+    E: Task<N>,
+    const N: usize,
+    const L: usize,
+    const C: usize,
+>(
+    app: &mut Firmware<P, E, N>,
+    (lidar, commands): (&Ring<L>, &Ring<C>),
+    hardware: &mut H,
+    supervisor: &mut Supervisor<impl SetDutyCycle>,
+    starter: &mut Starter,
+) {
+    let now_us = hardware.now_us();
+    app.set_time(now_us);
+    hardware.simulate(now_us, lidar);
+    if supervisor.is_due(now_us) {
+        let mut care = supervisor.look(now_us, app.seen());
+        if H::ASKS {
+            starter.look(now_us, &mut care);
+        }
+        app.set_care(care);
+        if care.progress {
+            hardware.feed_watchdog();
+        }
+        let due = app.tick();
+        if !due.is_empty() {
+            hardware.send(due);
+        }
+        while H::ASKS
+            && let Some(wanted) = starter.wants(now_us)
+        {
+            match wanted {
+                Wanted::Send(request) => hardware.send_to_lidar(&request),
+                Wanted::SetBaud(baud) => hardware.set_lidar_baud(baud),
             }
         }
-        app.set_bytes_lost(lidar.lost());
-        // A piece of each in turn, the lidar's first: a flood of commands takes no more than its share of the time.
-        let mut idle = true;
-        for is_lidar in [true, false] {
-            let mut bytes = [0; PIECE];
-            let count = match is_lidar {
-                true => lidar.read(&mut bytes),
-                false => commands.read(&mut bytes),
+    }
+    app.set_bytes_lost(lidar.lost());
+    // A piece of each in turn, the lidar's first: a flood of commands takes no more than its share of the time.
+    let mut idle = true;
+    for is_lidar in [true, false] {
+        let mut bytes = [0; PIECE];
+        let count = match is_lidar {
+            true => lidar.read(&mut bytes),
+            false => commands.read(&mut bytes),
+        };
+        idle &= count == 0;
+        let mut rest = bytes.get(..count).unwrap_or_default();
+        if H::ASKS && is_lidar {
+            starter.heard(rest);
+        }
+        while !rest.is_empty() {
+            let (taken, sent) = match is_lidar {
+                true => app.lidar(rest),
+                false => app.command(rest),
             };
-            idle &= count == 0;
-            let mut rest = bytes.get(..count).unwrap_or_default();
-            while !rest.is_empty() {
-                let (taken, sent) = match is_lidar {
-                    true => app.lidar(rest),
-                    false => app.command(rest),
-                };
-                rest = rest.get(taken..).unwrap_or_default();
-                if !sent.is_empty() {
-                    hardware.send(sent);
-                    hardware.log(app.pose());
-                    #[cfg(feature = "truth")]
-                    {
-                        let error = app.truth(|time_us| hardware.truth(time_us));
-                        hardware.send(error);
-                    }
+            rest = rest.get(taken..).unwrap_or_default();
+            if !sent.is_empty() {
+                hardware.send(sent);
+                hardware.log(app.pose());
+                #[cfg(feature = "truth")]
+                {
+                    let error = app.truth(|time_us| hardware.truth(time_us));
+                    hardware.send(error);
                 }
             }
         }
-        if idle {
-            // Looked at once more with interrupts masked: a byte that came just now would not wake the sleeper.
-            // A masked interrupt that is pending does.
-            critical_section::with(|_| {
-                if lidar.is_empty() && commands.is_empty() {
-                    hardware.wait();
-                }
-            });
-        }
+    }
+    // A search in a map goes on where nothing else is to be done.
+    if idle && app.work(WORK) {
+        // Looked at once more with interrupts masked: a byte that came just now would not wake the sleeper.
+        // A masked interrupt that is pending does.
+        critical_section::with(|_| {
+            if lidar.is_empty() && commands.is_empty() {
+                hardware.wait();
+            }
+        });
     }
 }
 

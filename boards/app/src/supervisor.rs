@@ -1,10 +1,18 @@
 //! Watches whether anything goes on: tells what the lidar does, keeps its motor turning, and says when the watchdog may
 //! be fed.
+//!
+//! How long that takes follows from the lidar's row in the table of models.
 
-use beamfix::lidar::motor::{self, Motor, MotorConfig};
+use beamfix::lidar::{
+    Start,
+    motor::{self, Motor},
+};
 use embedded_hal::pwm::SetDutyCycle;
 
-use crate::telemetry::{LidarState, MotorState};
+use crate::{
+    AppConfig,
+    telemetry::{LidarState, MotorState},
+};
 
 /// Time between two looks (µs).
 pub const LOOK_US: u32 = 20_000;
@@ -12,17 +20,20 @@ pub const LOOK_US: u32 = 20_000;
 const SILENT_US: u32 = 500_000;
 /// Bytes without a packet for so long are noise.
 const NOISE_US: u32 = 1_000_000;
-/// Packets without a revolution for so long: it stands. Two turns at 1 Hz.
-const STANDING_US: u32 = 2_000_000;
+/// Packets without a revolution for so many turns at its usual speed: it stands. Two at a tenth of that speed.
+const STANDING_TURNS: u32 = 20;
 /// Revolutions in a row without enough beams to match: the lidar is blind.
 const BLIND_TURNS: u8 = 5;
-/// Bytes that lead to nothing for so long: a reset is worth trying.
-const HOPELESS_US: u32 = 15_000_000;
-/// A motor that was switched off is started again after so long.
-const PAUSE_US: u32 = 2_000_000;
+/// The longest that a motor which nobody here drives takes to its speed, and the longest start-up by commands of a lidar that is
+/// well: on any of the models it takes less than this.
+const SPIN_UP_US: u32 = 5_000_000;
+/// Bytes that lead to nothing for so long after two spin-ups and start-ups: a reset is worth trying.
+const HOPELESS_US: u32 = 5_000_000;
+/// A motor that was switched off, and a lidar that did not start, are started again after so long.
+pub(crate) const PAUSE_US: u32 = 2_000_000;
 
 /// What the application has seen so far; all wrap.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Seen {
     /// Bytes of the lidar taken, or lost on their way: a line that is not read is not silent.
     pub bytes: u32,
@@ -30,8 +41,10 @@ pub struct Seen {
     pub packets: u32,
     /// Revolutions that went through the matcher.
     pub turns: u32,
-    /// The motor's speed by the last packet.
-    pub speed_deg_per_s: u16,
+    /// The motor's speed.
+    pub rpm: f32,
+    /// Whether every packet tells it; else it is known after a revolution.
+    pub tells_rpm: bool,
     /// Revolutions in a row, up to now, that had too few beams with a range to be matched; stays at the most.
     pub blind_turns: u8,
 }
@@ -45,6 +58,10 @@ pub struct Care {
     pub motor: MotorState,
     /// Times that the motor was started again; stays at the most.
     pub motor_restarts: u8,
+    /// Whether packets came since the last look.
+    pub packets: bool,
+    /// Whether revolutions come.
+    pub turns: bool,
     /// Whether the watchdog may be fed: bytes become revolutions, or there are none.
     pub progress: bool,
 }
@@ -55,12 +72,16 @@ impl Care {
         lidar: LidarState::Unknown,
         motor: MotorState::Free,
         motor_restarts: 0,
+        packets: false,
+        turns: false,
         progress: false,
     };
 }
 
 /// See the module.
 pub struct Supervisor<P> {
+    standing_us: u32,
+    hopeless_us: u32,
     motor: Option<Motor<P>>,
     motor_off_us: u32,
     restarts: u8,
@@ -96,8 +117,18 @@ impl Idle {
 
 impl<P: SetDutyCycle> Supervisor<P> {
     /// Starts the motor, or keeps its line low.
-    pub fn new(mut pwm: P, motor: Option<MotorConfig>, now_us: u32) -> Self {
-        let motor = match motor {
+    #[inline(always)]
+    pub fn new(mut pwm: P, config: &AppConfig, now_us: u32) -> Self {
+        let turn_us = 10_000_000 / u32::from(config.lidar.revolutions_per_10s.max(1));
+        let spin_up_us = match config.motor {
+            Some(motor) => motor.spin_up_ms.saturating_mul(1000),
+            None => SPIN_UP_US,
+        };
+        let attempt_us = match config.lidar.start {
+            Start::Listen => spin_up_us,
+            _ => spin_up_us.saturating_add(SPIN_UP_US),
+        };
+        let motor = match config.motor {
             Some(config) => {
                 let mut motor = Motor::new(pwm, config);
                 let _ = motor.start(now_us);
@@ -109,6 +140,8 @@ impl<P: SetDutyCycle> Supervisor<P> {
             }
         };
         Self {
+            standing_us: (STANDING_TURNS * turn_us).max(NOISE_US),
+            hopeless_us: attempt_us.saturating_mul(2).saturating_add(HOPELESS_US),
             motor,
             motor_off_us: 0,
             restarts: 0,
@@ -142,7 +175,7 @@ impl<P: SetDutyCycle> Supervisor<P> {
             LidarState::Silent
         } else if self.packets.us >= NOISE_US {
             LidarState::Noise
-        } else if self.fruitless_us >= STANDING_US {
+        } else if self.fruitless_us >= self.standing_us {
             LidarState::Standing
         } else if seen.blind_turns >= BLIND_TURNS {
             LidarState::Blind
@@ -153,7 +186,9 @@ impl<P: SetDutyCycle> Supervisor<P> {
             lidar,
             motor: self.motor(now_us, seen),
             motor_restarts: self.restarts,
-            progress: self.fruitless_us < HOPELESS_US,
+            packets: self.packets.us == 0,
+            turns: self.turns.us < self.standing_us,
+            progress: self.fruitless_us < self.hopeless_us,
         }
     }
 
@@ -161,8 +196,12 @@ impl<P: SetDutyCycle> Supervisor<P> {
         let Some(motor) = &mut self.motor else {
             return MotorState::Free;
         };
-        if self.packets.us == 0 {
-            let _ = motor.report(now_us, f32::from(seen.speed_deg_per_s) / 6.0);
+        let told = match seen.tells_rpm {
+            true => &self.packets,
+            false => &self.turns,
+        };
+        if told.us == 0 {
+            let _ = motor.report(now_us, seen.rpm);
         }
         match motor.poll(now_us) {
             Ok(motor::MotorState::SpinningUp) => MotorState::SpinningUp,

@@ -157,6 +157,9 @@ fn verdict(verdict: Verdict) -> &'static str {
         Verdict::Unlikely => "unlikely",
         Verdict::BadGuess => "bad guess",
         Verdict::BadConfig => "bad setting",
+        Verdict::Doubtful => "doubtful",
+        Verdict::Searching => "searching",
+        Verdict::Choosing => "choosing",
     }
 }
 
@@ -168,6 +171,8 @@ fn lidar(state: LidarState) -> &'static str {
         LidarState::Standing => "stands",
         LidarState::Turning => "turns",
         LidarState::Blind => "is blind",
+        LidarState::Starting => "is being started",
+        LidarState::Defective => "is defective",
     }
 }
 

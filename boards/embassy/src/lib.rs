@@ -30,7 +30,7 @@ pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
     pwm: impl SetDutyCycle,
     mut feed: impl FnMut(),
 ) -> ! {
-    let mut supervisor = Supervisor::new(pwm, config.motor, now_us());
+    let mut supervisor = Supervisor::new(pwm, config, now_us());
     let _ = lines.telemetry.write_all(app.ready(reset)).await;
     defmt::info!("beamfix listens for an LD06 at {} baud", LIDAR_BAUD);
     let mut overruns = 0u32;

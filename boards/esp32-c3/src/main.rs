@@ -201,7 +201,7 @@ fn drain<E, const B: usize>(mut read: impl FnMut(&mut [u8]) -> Result<usize, E>,
     loop {
         match read(&mut bytes) {
             Ok(0) => return,
-            Ok(n) => bytes.iter().take(n).for_each(|&byte| ring.push(byte)),
+            Ok(n) => ring.extend(bytes.get(..n).unwrap_or_default()),
             // The driver then empties the UART: how many bytes that was, nobody knows.
             Err(_) => ring.lose(1),
         }

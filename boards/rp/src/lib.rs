@@ -196,10 +196,10 @@ fn drain<D: UartDevice, P: ValidUartPinout<D>, const B: usize>(
     let mut bytes = [0; 32];
     loop {
         match uart.read_raw(&mut bytes) {
-            Ok(n) => bytes.iter().take(n).for_each(|&byte| ring.push(byte)),
+            Ok(n) => ring.extend(bytes.get(..n).unwrap_or_default()),
             // The byte with the error is gone, those before it are good.
             Err(nb::Error::Other(error)) => {
-                error.discarded.iter().for_each(|&byte| ring.push(byte));
+                ring.extend(error.discarded);
                 ring.lose(1);
             }
             Err(nb::Error::WouldBlock) => return,

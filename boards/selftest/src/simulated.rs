@@ -23,6 +23,8 @@ impl<H> Simulated<H> {
 }
 
 impl<H: Hardware> Hardware for Simulated<H> {
+    const ASKS: bool = H::ASKS;
+
     fn reset(&mut self) -> Reset {
         self.hardware.reset()
     }
@@ -33,6 +35,14 @@ impl<H: Hardware> Hardware for Simulated<H> {
 
     fn send(&mut self, bytes: &[u8]) {
         self.hardware.send(bytes);
+    }
+
+    fn send_to_lidar(&mut self, bytes: &[u8]) {
+        self.hardware.send_to_lidar(bytes);
+    }
+
+    fn set_lidar_baud(&mut self, baud: u32) {
+        self.hardware.set_lidar_baud(baud);
     }
 
     fn feed_watchdog(&mut self) {

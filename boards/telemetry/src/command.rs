@@ -46,6 +46,15 @@ pub enum Command<'a> {
         /// Counter-clockwise (rad/s).
         rate: f32,
     },
+    /// Where the robot is in the map, for a board that localizes; others leave it out.
+    StartAt {
+        /// Forward in the map (m).
+        x: f32,
+        /// Left (m).
+        y: f32,
+        /// Heading (rad).
+        theta: f32,
+    },
 }
 
 /// A beam as it is sent: `u16` bearing, `u16` range (mm, 0 for none), `u32` time (µs), `u8` quality, little endian.

@@ -2,12 +2,11 @@
 
 use beamfix::{
     geometry,
-    lidar::{Packet as _, ld06},
     matching::{Match, MatchError},
     odometry::{Refusal, Step},
-    scan::{Bearing, Mount},
+    scan::{Beam, Bearing, Mount},
 };
-use heapless::Vec;
+use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
 
 /// Most bytes of a framed [`Pose`].
@@ -18,6 +17,10 @@ pub const HEALTH_FRAME: usize = 56;
 pub const QUALITY_FRAME: usize = 80;
 /// Most bytes of a [`Raw`]: an LD06's packet.
 pub const RAW: usize = 47;
+/// Most beams of a [`Piece`]: those of an LD06's packet.
+pub const PIECE: usize = 12;
+/// Most bytes of a model's name.
+pub const NAME: usize = 24;
 
 /// A message from the board. Whether a match was good stands in its pose; how good, in all numbers, in its quality.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,7 +48,7 @@ pub enum Telemetry {
 }
 
 /// The firmware listens.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ready {
     /// Version of the messages; changes whenever one of them does.
     pub version: u8,
@@ -55,6 +58,19 @@ pub struct Ready {
     pub reset: Reset,
     /// How the lidar sits on the robot: what the bearings of [`Piece`] are to be seen through.
     pub mount: Mounted,
+    /// Name of the lidar's model.
+    pub lidar: String<NAME>,
+    /// What is done with it.
+    pub task: Task,
+}
+
+/// What a board finds its poses by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Task {
+    /// Since the start, by the scans themselves.
+    Odometry,
+    /// In a map that lies in its flash.
+    Localization,
 }
 
 /// How the lidar sits on the robot.
@@ -106,10 +122,10 @@ pub struct Pose {
     pub sequence: u16,
     /// End of the revolution (µs, the lidar's clock, wrapping).
     pub time_us: u32,
-    /// Forward, left (m) and heading (rad) since the start.
+    /// Forward, left (m) and heading (rad): since the start by odometry, in the map by localization.
     pub pose: [f32; 3],
-    /// Covariance of `pose` since the start, growing with the way, in the frame of `pose`: xx, xy, yy (m²), xθ, yθ
-    /// (m·rad), θθ (rad²).
+    /// Covariance of `pose` in its frame: xx, xy, yy (m²), xθ, yθ (m·rad), θθ (rad²). By odometry since the start, growing
+    /// with the way; by localization [`NOT_KNOWN`] where nothing has measured the pose.
     pub covariance: [f32; 6],
     /// What became of the match.
     pub verdict: Verdict,
@@ -121,7 +137,10 @@ pub struct Pose {
     pub residual: f32,
 }
 
-/// What became of a match. All but the first two mean that the pose is only predicted.
+/// Covariance of a pose that nothing has measured: a kilometre, and more than half a turn.
+pub const NOT_KNOWN: [f32; 6] = [1e6, 0.0, 1e6, 0.0, 0.0, 10.0];
+
+/// What became of a match. All but the first two mean that the pose is only predicted, or less: see [`Verdict::Searching`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Verdict {
     /// The pose is measured.
@@ -154,6 +173,12 @@ pub enum Verdict {
     BadGuess,
     /// A setting is out of its range.
     BadConfig,
+    /// In a map: predicted, or matched so that it may be another place.
+    Doubtful,
+    /// In a map: nobody knows, the pose is all zeros.
+    Searching,
+    /// In a map: one of several places, which the robot's motion will tell apart; the pose as while searching.
+    Choosing,
 }
 
 impl Verdict {
@@ -330,6 +355,10 @@ pub enum LidarState {
     Turning,
     /// Revolutions come, but hardly a beam of them has a range: covered, dirty, or in a void.
     Blind,
+    /// It is being asked to start.
+    Starting,
+    /// It answers that it is defective.
+    Defective,
 }
 
 /// What the lidar's motor does.
@@ -383,20 +412,20 @@ pub struct Piece {
     /// Bearing of the last.
     pub last: u16,
     /// Ranges (mm), 0 for none.
-    pub ranges_mm: Vec<u16, { ld06::POINTS }>,
+    pub ranges_mm: Vec<u16, PIECE>,
 }
 
 impl Piece {
-    /// What a packet holds.
+    /// The first [`PIECE`] of some beams, of which number `turn_start` is the first of a revolution.
     #[must_use]
-    pub fn of(packet: &ld06::Packet, turn_start: Option<usize>) -> Self {
+    pub fn of(beams: impl Iterator<Item = Beam>, turn_start: Option<usize>) -> Self {
         let mut piece = Self {
-            turn_start: turn_start.map(|k| k as u8),
+            turn_start: turn_start.filter(|&k| k < PIECE).map(|k| k as u8),
             first: 0,
             last: 0,
             ranges_mm: Vec::new(),
         };
-        for (k, beam) in packet.beams().enumerate() {
+        for (k, beam) in beams.take(PIECE).enumerate() {
             if k == 0 {
                 piece.first = beam.bearing.0;
             }

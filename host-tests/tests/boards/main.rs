@@ -7,6 +7,7 @@ mod card;
 #[path = "../common/mod.rs"]
 mod common;
 mod demo;
+mod every_lidar;
 mod fields;
 mod flood;
 mod lidar_cost;

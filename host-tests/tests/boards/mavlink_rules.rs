@@ -163,7 +163,7 @@ fn told(autopilot: Autopilot) -> Told {
             beams: 400,
             residual: 0.01,
         },
-        twist: Twist::ZERO,
+        twist: Some(Twist::ZERO),
         resets: 7,
         autopilot,
     }

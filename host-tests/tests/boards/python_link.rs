@@ -11,7 +11,7 @@ use beamfix_app::{
     link,
     telemetry::{
         Cost, Found, Gyro, Health, LidarState, MotorState, Mounted, Piece, Pose, Quality, Raw,
-        Ready, Reset, Telemetry, Truth, Verdict, Weak, Wheels,
+        Ready, Reset, Task, Telemetry, Truth, Verdict, Weak, Wheels,
     },
 };
 use serde_json::Value;
@@ -48,12 +48,15 @@ fn messages() -> Vec<Telemetry> {
         Verdict::Unlikely,
         Verdict::BadGuess,
         Verdict::BadConfig,
+        Verdict::Doubtful,
+        Verdict::Searching,
+        Verdict::Choosing,
     ];
     let mut all = vec![];
-    for (reset, upside_down) in [
-        (Reset::Power, false),
-        (Reset::Watchdog, true),
-        (Reset::Other, false),
+    for (reset, upside_down, task) in [
+        (Reset::Power, false, Task::Odometry),
+        (Reset::Watchdog, true, Task::Localization),
+        (Reset::Other, false, Task::Odometry),
     ] {
         let mount = Mounted {
             pose: [0.1, -THIRD, 3.0],
@@ -64,6 +67,8 @@ fn messages() -> Vec<Telemetry> {
             beams: 456,
             reset,
             mount,
+            lidar: "rplidar-ultradense".try_into().expect("room"),
+            task,
         }));
     }
     for (k, verdict) in verdicts.into_iter().enumerate() {
@@ -91,6 +96,8 @@ fn messages() -> Vec<Telemetry> {
         LidarState::Standing,
         LidarState::Turning,
         LidarState::Blind,
+        LidarState::Starting,
+        LidarState::Defective,
     ];
     for (k, lidar) in states.into_iter().enumerate() {
         all.push(Telemetry::Health(Health {
@@ -226,7 +233,7 @@ fn the_firmware_understands_pythons_commands() {
     };
     let script = "import sys; sys.path.insert(0, sys.argv[1]); import beamfix_link as b; \
         sys.stdout.buffer.write(b.wheels(1.5, -0.25, 3.0) + b.lidar(bytes(range(94))) + b.ask_health() \
-        + b.send(raw=True, quality=True) + b.gyro(-0.5))";
+        + b.send(raw=True, quality=True) + b.gyro(-0.5) + b.start_at(1.0, 2.0, -0.5))";
     let folder = file.parent().expect("a folder");
     let output = python
         .args(["-c", script])
@@ -258,10 +265,15 @@ fn the_firmware_understands_pythons_commands() {
                 scans: false,
                 quality: true,
             },
-            _ => Command::Gyro { rate: -0.5 },
+            4 => Command::Gyro { rate: -0.5 },
+            _ => Command::StartAt {
+                x: 1.0,
+                y: 2.0,
+                theta: -0.5,
+            },
         };
         assert_eq!(command, wanted);
         got += 1;
     }
-    assert_eq!((got, receiver.counters().errors), (5, 0));
+    assert_eq!((got, receiver.counters().errors), (6, 0));
 }

@@ -2,6 +2,7 @@
 
 use beamfix::lidar::motor::MotorConfig;
 use beamfix_app::{
+    AppConfig, CONFIG,
     run::NoPwm,
     supervisor::{Care, LOOK_US, Seen, Supervisor},
     telemetry::{LidarState, MotorState},
@@ -50,7 +51,11 @@ fn watch<P: SetDutyCycle>(
 #[test]
 fn each_state_is_told_and_only_bytes_that_lead_nowhere_starve_the_watchdog() {
     use LidarState::{Noise, Silent, Standing, Turning};
-    let mut supervisor = Supervisor::new(NoPwm, None, 0);
+    let config = AppConfig {
+        motor: None,
+        ..CONFIG
+    };
+    let mut supervisor = Supervisor::new(NoPwm, &config, 0);
     // The clock and the counters wrap on the way.
     let (mut seen, mut now_us) = (Seen::default(), u32::MAX - 30_000_000);
     seen.bytes = u32::MAX - 1000;
@@ -76,14 +81,17 @@ fn each_state_is_told_and_only_bytes_that_lead_nowhere_starve_the_watchdog() {
 #[test]
 fn a_motor_that_stalls_is_started_again() {
     let duty = Cell::new(7);
-    let config = MotorConfig {
-        initial_duty: 0.5,
-        ..MotorConfig::LDROBOT_LD06
+    let config = AppConfig {
+        motor: Some(MotorConfig {
+            initial_duty: 0.5,
+            ..MotorConfig::LDROBOT_LD06
+        }),
+        ..CONFIG
     };
-    let mut supervisor = Supervisor::new(Pwm(&duty), Some(config), 0);
+    let mut supervisor = Supervisor::new(Pwm(&duty), &config, 0);
     assert_eq!(duty.get(), 500);
     let (mut seen, mut now_us) = (Seen::default(), 0);
-    seen.speed_deg_per_s = 3600;
+    (seen.rpm, seen.tells_rpm) = (600.0, true);
     let turning = (352, 7, true);
     let care = watch(&mut supervisor, &mut seen, &mut now_us, turning, 2000);
     assert_eq!((care.motor, care.motor_restarts), (MotorState::Steady, 0));
@@ -99,6 +107,10 @@ fn a_motor_that_stalls_is_started_again() {
 #[test]
 fn without_a_motor_the_line_is_low() {
     let duty = Cell::new(7);
-    let _ = Supervisor::new(Pwm(&duty), None, 0);
+    let config = AppConfig {
+        motor: None,
+        ..CONFIG
+    };
+    let _ = Supervisor::new(Pwm(&duty), &config, 0);
     assert_eq!(duty.get(), 0);
 }
