@@ -127,7 +127,8 @@ impl<'a, const N: usize> Localizer<'a, N> {
 
     /// Tracks from a known pose of the lidar in the map on.
     pub fn start_at(&mut self, map_from_lidar: Pose) {
-        self.pose = map_from_lidar;
+        let Pose { x, y, theta } = map_from_lidar;
+        self.pose = Pose::new(x, y, theta);
         (self.bad_scans, self.doubts) = (0, 0);
         self.state = if map_from_lidar.is_finite() {
             State::Tracking
@@ -251,7 +252,11 @@ impl<'a, const N: usize> Localizer<'a, N> {
             self.doubts = self.doubts.saturating_add(1);
         } else {
             self.pose = predicted;
-            self.bad_scans = self.bad_scans.saturating_add(1);
+            // Motions that lead beyond all numbers lead nowhere.
+            self.bad_scans = match predicted.is_finite() {
+                true => self.bad_scans.saturating_add(1),
+                false => u8::MAX,
+            };
         }
         if self.bad_scans >= self.config.max_bad_scans
             || self.doubts >= self.config.max_doubtful_scans

@@ -404,3 +404,30 @@ fn maps_and_scans_that_say_nothing_give_no_pose() {
         ));
     }
 }
+
+#[test]
+fn a_pose_is_finite_wherever_it_starts_and_whatever_moves_it() {
+    let place = place();
+    let mut buffer = vec![0; Pyramid::bytes(place.map.shape())];
+    let pyramid = Pyramid::new(place.field.as_slice(), &mut buffer).expect("fits");
+    let mut robot = Robot::new(pyramid, LocalizerConfig::DEFAULT);
+    let start = Pose {
+        x: 3e-26,
+        y: -1e19,
+        theta: -3.2e19,
+    };
+    let far = Pose {
+        x: f32::MAX,
+        y: f32::MAX,
+        theta: 1e30,
+    };
+    for motion in [Pose::IDENTITY, far] {
+        robot.start_at(start);
+        for _ in 0..4 {
+            robot.update(&[], motion);
+            let pose = robot.pose();
+            assert!(pose.is_none_or(Pose::is_finite), "{pose:?}");
+        }
+    }
+    assert_eq!(robot.pose(), None, "nowhere");
+}
