@@ -75,7 +75,12 @@ const fn logarithm(range: u16) -> u8 {
     let octave = range.ilog2();
     // The fraction by its first four bits: off by less than a sixteenth and a half.
     let fraction = ((range << 4) >> octave) & 15;
-    (16 * octave + fraction + 1) as u8
+    let sixteenths = 16 * octave + fraction;
+    if sixteenths < 255 {
+        sixteenths as u8 + 1
+    } else {
+        u8::MAX
+    }
 }
 
 impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: usize>
@@ -192,7 +197,8 @@ mod tests {
     fn logarithms_rise_by_a_sixteenth_of_an_octave() {
         assert_eq!(logarithm(0), 1);
         assert_eq!(logarithm(2000) - logarithm(1000), 16);
-        assert_eq!(logarithm(u16::MAX), 16 * 15 + 16);
+        assert_eq!(logarithm(32_767), 16 * 14 + 16);
+        assert_eq!(logarithm(u16::MAX), u8::MAX);
         let values: Vec<u8, 64> = (0..64).map(|k| logarithm(1000 + 16 * k)).collect();
         assert!(values.windows(2).all(|pair| pair[1] >= pair[0]));
     }

@@ -239,10 +239,13 @@ fn what_is_no_edge_is_given_back() {
     graph.add(Pose::IDENTITY, 0).expect("room");
     graph.add(Pose::IDENTITY, 0).expect("room");
     assert_eq!(
-        graph.add(Pose {
-            x: f32::NAN,
-            ..Pose::IDENTITY
-        }),
+        graph.add(
+            Pose {
+                x: f32::NAN,
+                ..Pose::IDENTITY
+            },
+            0
+        ),
         None
     );
     let good = edge(0, 1, CHAIN, Kind::Chain, &mut Noise::new(1, 1));
