@@ -1,5 +1,7 @@
 //! How far off a prior may be: an error model for each source, scaled by how well it did lately.
 
+use core::f32::consts::FRAC_1_PI;
+
 use super::motion::Source;
 use crate::{
     geometry::{Pose, Twist},
@@ -55,16 +57,17 @@ pub(super) fn unforeseen(duration: f32) -> Covariance {
 /// change with wheels, which tell the mean velocity of the scan, and half of it without. What the noise of three matches
 /// (each of covariance `of_match`) changes the velocity by on the mean is left out. A scan bent by a rotation is moved as
 /// well: of beams all around that are turned by -θ to θ from the first to the last, places `range` (m) away move by
-/// `range`·θ/π on the mean. `bent` is a rotation (rad) of the end that the residuals tell.
+/// `range`·θ/π on the mean. With wheels, whose mean rate is right, the beams between the first and the last are turned by half of θ
+/// at most, and it is `range`·θ/π². `bent` is a rotation (rad) of the end that the residuals tell.
 pub(super) fn skew(
     change: Twist,
     duration: f32,
     source: Source,
     (of_match, range, bent): (&Covariance, f32, f32),
 ) -> Covariance {
-    let share = match source {
-        Source::Wheels => 0.25,
-        Source::Velocity => 0.5,
+    let (share, moving) = match source {
+        Source::Wheels => (0.25, FRAC_1_PI * FRAC_1_PI),
+        Source::Velocity => (0.5, FRAC_1_PI),
     };
     /// Variances of a match in a change of velocity, which is 1, -2 and 1 times a match's error.
     const NOISE: f32 = 6.0;
@@ -75,7 +78,7 @@ pub(super) fn skew(
     let noise = &of_match.0;
     let rotation = math::max(rest(change.omega, noise.tt), bent);
     let distance = rest(change.speed(), noise.xx + noise.yy);
-    let moved = rotation * range * core::f32::consts::FRAC_1_PI;
+    let moved = rotation * range * moving;
     spread(math::sqrt(distance * distance + moved * moved), rotation)
 }
 

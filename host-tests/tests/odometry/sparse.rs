@@ -92,16 +92,15 @@ fn a_ring_of_64_beams_follows_a_minute_in_the_flat() {
         );
         // At any time: since matches are refused that have not converged, seeds 12 and 13 are 0.17 and 0.18 m off for a moment.
         farther += u32::from(outcome.largest.0 >= 0.15);
-        assert!(
-            outcome.largest.0 < 0.2 && farther <= 2,
-            "seed {seed}: {outcome:?}, {farther} farther off than 0.15 m"
-        );
+        assert!(outcome.largest.0 < 0.2, "seed {seed}: {outcome:?}");
         // The wheels alone are a metre and 30° off.
         assert!(
             outcome.last.1 < 0.2 * outcome.wheels.1,
             "seed {seed}: {outcome:?}"
         );
     }
+    println!("{farther} of 16 farther off than 0.15 m at some time, NEES {nees:.2}");
+    assert!(farther <= 2, "{farther}");
     // 1 is ideal; what errs alike in many matches is allowed for.
     assert!((0.2..1.2).contains(&nees), "{nees}");
 }
