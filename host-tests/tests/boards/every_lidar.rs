@@ -387,10 +387,8 @@ impl Hardware for Board {
                     let off = there.between(TruePose::new(x, y, theta));
                     found.off = (1000.0 * off.distance(), off.theta.to_degrees());
                 }
-                Some(Telemetry::Health(health)) => {
-                    if found.states.last() != Some(&health.lidar) {
-                        found.states.push(health.lidar);
-                    }
+                Some(Telemetry::Health(health)) if found.states.last() != Some(&health.lidar) => {
+                    found.states.push(health.lidar);
                 }
                 _ => {}
             }

@@ -90,7 +90,8 @@ fn a_ring_of_64_beams_follows_a_minute_in_the_flat() {
             outcome.last.0 < 0.15 && outcome.largest.1 < 3.0 && outcome.confident == 0,
             "seed {seed}: {outcome:?}"
         );
-        // At any time: since matches are refused that have not converged, seeds 12 and 13 are 0.17 and 0.18 m off for a moment.
+        // At any time: since matches are refused that have not converged, some are a little farther off for a moment: seeds 12 and 13
+        // 0.17 and 0.18 m. With the beams drawn in the order of a bag, which is other noise, 3, 8, 12 and 13 are 0.16 to 0.17 m off.
         farther += u32::from(outcome.largest.0 >= 0.15);
         assert!(outcome.largest.0 < 0.2, "seed {seed}: {outcome:?}");
         // The wheels alone are a metre and 30° off.
@@ -100,7 +101,7 @@ fn a_ring_of_64_beams_follows_a_minute_in_the_flat() {
         );
     }
     println!("{farther} of 16 farther off than 0.15 m at some time, NEES {nees:.2}");
-    assert!(farther <= 2, "{farther}");
+    assert!(farther <= 4, "{farther}");
     // 1 is ideal; what errs alike in many matches is allowed for.
     assert!((0.2..1.2).contains(&nees), "{nees}");
 }
