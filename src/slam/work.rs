@@ -1,7 +1,7 @@
 //! What is done in the time between scans, in slices.
 
 use super::{
-    Slam,
+    FRESH, Slam,
     graph::{Kind, Slot},
     solver::Progress,
     task::{Meeting, Work},
@@ -128,7 +128,12 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
                 None => Work::Clear(None),
             };
         }
-        if let Some(slot) = self.fresh.pop_front() {
+        // New keyframes are searched for first, unless many wait: then the graph would never be solved, what it tells of their
+        // places would stay uncertain, and an uncertain place is a long search.
+        let many_wait = self.fresh.len() > FRESH / 2;
+        if !(self.changed && many_wait)
+            && let Some(slot) = self.fresh.pop_front()
+        {
             return Work::Look(slot);
         }
         if core::mem::take(&mut self.changed) {
