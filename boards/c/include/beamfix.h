@@ -195,9 +195,11 @@ typedef int32_t beamfix_action_kind;
 // A lidar: how its bytes are read, at what speed they come, how it is started.
 typedef struct beamfix_lidar beamfix_lidar;
 
-// A pipeline with its estimator: bytes of a lidar in, steps out. The mark comes first: memory that is overwritten from its start on
-// is known by it.
+// A pipeline with its estimator: bytes of a lidar in, steps out.
 typedef struct beamfix beamfix;
+
+// Start-up of one lidar: polled until it says that measurements come.
+typedef struct beamfix_startup beamfix_startup;
 
 // Settings: how the lidar sits on the robot, and which ranges count. beamfix_default_config fills them in for a lidar.
 typedef struct {
@@ -261,12 +263,6 @@ typedef struct {
     // Times that what scans are matched against was given up.
     uint32_t lost;
 } beamfix_health;
-
-// Start-up of one lidar: polled until it says that measurements come.
-typedef struct {
-    uint32_t magic;
-    Startup startup;
-} beamfix_startup;
 
 // What a start-up wants done, and with what.
 typedef struct {

@@ -31,8 +31,8 @@ use crate::{
 /// Marks memory that an object was made in; the version is in it, so that a header of another version is noticed too.
 const MAGIC: u32 = 0xbea0_0f00 + BEAMFIX_VERSION;
 
-/// A pipeline with its estimator: bytes of a lidar in, steps out. The mark comes first: memory that is overwritten from its start on
-/// is known by it.
+/// A pipeline with its estimator: bytes of a lidar in, steps out.
+// The mark comes first: memory that is overwritten from its start on is known by it.
 #[repr(C)]
 pub struct Object {
     magic: u32,

@@ -13,7 +13,6 @@ use crate::{lidars::Lidar, types::*};
 const MAGIC: u32 = 0xbea0_5700 + BEAMFIX_VERSION;
 
 /// Start-up of one lidar: polled until it says that measurements come.
-#[repr(C)]
 pub struct Starter {
     magic: u32,
     startup: Startup,
