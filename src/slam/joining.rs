@@ -77,13 +77,13 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         let mut agreeing: Vec<Edge, PENDING> = Vec::new();
         let (graph, config) = (&self.graph, &self.config);
         self.pending.retain(|edge| {
-            let taken = edge == new || verify::agree(graph, new, edge, config) == Some(true);
-            if taken {
+            let agrees = verify::agree(graph, new, edge, config);
+            if edge == new || agrees == Some(true) {
                 // As many as wait at most: it fits.
                 let _ = agreeing.push(*edge);
             }
-            // The others were wrong.
-            verify::agree(graph, new, edge, config).is_none()
+            // The others between the two were wrong.
+            agrees.is_none()
         });
         // The older frame stays.
         let motion = there.pose * new.motion * here.pose.inverse();

@@ -36,8 +36,8 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         true
     }
 
-    /// The smallest and the largest coordinates of all that keyframes saw no farther than `max_range` (m), and of the
-    /// places that they saw it from; `None` without keyframes. Unpacks every keyframe.
+    /// The smallest and the largest coordinates (m) of all that the keyframes of the map saw no farther than `max_range` (m), and
+    /// of the places that they saw it from; `None` without keyframes. Unpacks every keyframe of the map.
     pub fn extent(&mut self, max_range: f32) -> Option<(Point, Point)> {
         let mut found: Option<(Point, Point)> = None;
         let map = self.graph.oldest_submap();

@@ -143,7 +143,7 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         if let Some(search) = self.recognition() {
             return Work::Recognize(search);
         }
-        if self.graph.edges().len() + 2 * super::FRESH > E {
+        if self.graph.edges().len() + 2 * FRESH > E {
             self.thin();
         }
         // Time is left: keyframes are weighed before room is needed.
@@ -154,7 +154,7 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         }
         // And a keyframe may find loops that its first look did not, as the poses were not as good: a few between one new
         // keyframe and the next, as long as there is ample room. All in turn, so each is looked at again.
-        let room = self.graph.edges().len() + 4 * super::FRESH < E;
+        let room = self.graph.edges().len() + 4 * FRESH < E;
         let mut passed = 0;
         while room && self.quiet < AGAIN && passed < K {
             passed += 1;

@@ -14,8 +14,8 @@ use crate::{
 /// ones saw another.
 const SAME_FIFTHS: u32 = 16;
 
-/// Moves points seen from `at` along their beams, three quarters of the way to the lines that they meet: a
-/// mean, three to one, of a surface as it was known and as it was seen once more.
+/// Moves points seen from `at` along their beams, three quarters of the way to the lines that they meet: a mean, three
+/// to one, of a surface as it was known and as it was seen once more.
 pub(super) fn smooth_towards(lines: &[Line], points: &mut [ScanPoint], at: FixedPose, sigma: u32) {
     let same = SAME_FIFTHS * sigma / 5;
     let mut projection = Projection::new(lines, at);
