@@ -11,6 +11,7 @@ mod every_lidar;
 mod fields;
 mod flood;
 mod lidar_cost;
+mod localize;
 mod mavlink;
 mod mavlink_rules;
 mod on_target;
