@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use beamfix::lidar::identify::identify;
-use beamfix::lidar::model::{Family, Model, Start};
-use beamfix::lidar::startup::{Action, Mode, StartConfig, Startup};
+use beamfix::lidar::model::{Model, Start};
+use beamfix::lidar::startup::{Action, StartConfig, Startup};
 use serialport::SerialPort;
 
 use crate::decode;
@@ -41,11 +41,8 @@ pub fn start(port: &mut dyn SerialPort, name: &str, baud: Option<u32>) -> Result
             ..model
         };
         port.set_baud_rate(model.baud)?;
-        let mode = asked(port, &model, StartConfig::DEFAULT)?;
-        return Ok(Model {
-            family: family(&model, mode),
-            ..model
-        });
+        asked(port, &model, StartConfig::DEFAULT)?;
+        return Ok(model);
     }
     let mut bauds: Vec<u32> = match baud {
         Some(baud) => vec![baud],
@@ -95,7 +92,7 @@ fn told(port: &mut dyn SerialPort) -> Result<Option<Model>> {
 }
 
 /// Sends what a sensor is started with, and reads its answers.
-fn asked(port: &mut dyn SerialPort, model: &Model, config: StartConfig) -> Result<Mode> {
+fn asked(port: &mut dyn SerialPort, model: &Model, config: StartConfig) -> Result<()> {
     let mut startup = Startup::new(model, config);
     let (began, mut bytes) = (Instant::now(), [0; 256]);
     loop {
@@ -114,7 +111,8 @@ fn asked(port: &mut dyn SerialPort, model: &Model, config: StartConfig) -> Resul
                 let n = read(port, &mut bytes)?;
                 bytes[..n].iter().for_each(|&byte| startup.push(byte));
             }
-            Action::Ready(mode) => return Ok(mode),
+            // In the mode that the model's parser reads.
+            Action::Ready(_) => return Ok(()),
             Action::Failed(error) => bail!("{}: {error}", model.name),
         }
     }
@@ -135,17 +133,5 @@ pub fn read(port: &mut dyn SerialPort, bytes: &mut [u8]) -> Result<usize> {
             Ok(0)
         }
         Err(error) => Err(error).context("the line"),
-    }
-}
-
-/// What an RPLIDAR sends in the mode in which it was started.
-fn family(model: &Model, mode: Mode) -> Family {
-    match mode.answer {
-        0x81 => Family::RplidarScan,
-        0x82 => Family::RplidarExpress,
-        0x84 => Family::RplidarUltra,
-        0x85 => Family::RplidarDense,
-        0x86 => Family::RplidarUltraDense,
-        _ => model.family,
     }
 }

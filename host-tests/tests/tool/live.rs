@@ -130,6 +130,30 @@ fn a_lidar_that_waits_for_a_command_gets_it() {
 }
 
 #[test]
+fn a_lidar_that_is_asked_as_an_rplidar_is_read_as_what_it_is() {
+    // YDLIDAR X4: information, health, scan; the answer to the last is of the kind that an RPLIDAR's standard scan has.
+    static ASKED: Answers<'static> = Answers {
+        answers: &[
+            (
+                &[0xa5, 0x90],
+                &[
+                    0xa5, 0x5a, 20, 0, 0, 0, 4, 6, 1, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+                    0, 0, 0,
+                ],
+            ),
+            (&[0xa5, 0x91], &[0xa5, 0x5a, 3, 0, 0, 0, 6, 0, 0, 0]),
+            (&[0xa5, 0x92], &[0xa5, 0x5a, 3, 0, 0, 0, 6, 0, 0, 0]),
+            (&[0xa5, 0x60], &[0xa5, 0x5a, 5, 0, 0, 0x40, 0x81]),
+        ],
+        scan: Some(&[0xa5, 0x60]),
+    };
+    let (said, asked, _) = follow(&Model::YDLIDAR_X4, Model::YDLIDAR_X4.name, &ASKED);
+    assert!(asked.ends_with(&[0xa5, 0x60]), "{asked:x?}");
+    assert_eq!(said["scans"], 25, "{said}");
+    assert_eq!(said["refused"], 0, "{said}");
+}
+
+#[test]
 fn a_silent_line_is_told() {
     let (_master, slave) = TTYPort::pair().expect("a pseudo-terminal");
     let path = slave.name().expect("its name");
