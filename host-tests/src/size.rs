@@ -48,10 +48,16 @@ pub fn fitting<'a>(scans: impl Iterator<Item = &'a [Beam]>) -> usize {
         .unwrap_or(largest)
 }
 
+/// Beams of a revolution of this lidar at its usual speed.
+#[must_use]
+pub fn beams_of(model: &Model) -> usize {
+    (10 * model.points_per_s / u32::from(model.revolutions_per_10s.max(1))) as usize
+}
+
 /// What [`fitting`] gives for scans of this lidar at its usual speed; more than the largest of [`SIZES`] where none has room.
 #[must_use]
 pub fn of_model(model: &Model) -> usize {
-    let beams = (10 * model.points_per_s / u32::from(model.revolutions_per_10s.max(1))) as usize;
+    let beams = beams_of(model);
     SIZES
         .into_iter()
         .find(|&size| size >= beams)

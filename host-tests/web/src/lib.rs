@@ -18,6 +18,7 @@ use std::cell::RefCell;
 use std::sync::Mutex;
 
 use beamfix_sim::TruePose;
+use host_tests::size;
 use serde_json::json;
 
 use twin::Twin;
@@ -96,7 +97,7 @@ pub extern "C" fn choices() -> usize {
     let lidars: Vec<_> = live::lidars()
         .map(|model| {
             let rate = f64::from(model.revolutions_per_10s) / 10.0;
-            let words = format!("{} beams, {rate} Hz", live::beams(model));
+            let words = format!("{} beams, {rate} Hz", size::beams_of(model));
             [model.name.to_owned(), words]
         })
         .collect();

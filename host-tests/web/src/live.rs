@@ -31,11 +31,6 @@ pub struct Live {
     left: f64,
 }
 
-/// Beams of a revolution.
-pub fn beams(model: &Model) -> usize {
-    (10 * model.points_per_s / u32::from(model.revolutions_per_10s.max(1))) as usize
-}
-
 /// The lidars whose revolutions fit whole.
 pub fn lidars() -> impl Iterator<Item = &'static Model> {
     Model::ALL
