@@ -48,8 +48,8 @@ impl<const N: usize> Odometry<N> {
     /// is counted, and says why; after [`OdometryConfig::max_refused`] of them in a row the scan becomes the keyframe, which
     /// [`Counters::lost`] tells.
     ///
-    /// Costs a match or two. A scan that fits nowhere costs up to about eight usual ones without wheels, as other starts compete
-    /// then, and up to about fourteen with them.
+    /// Costs a match or two, and one more where a turn sets in without wheels: the README's table has the dearest of an ordinary
+    /// drive. A scan that fits nowhere costs several times a usual one, as other starts compete then; a bounded number of them.
     pub fn update(&mut self, scan: &Scan<N>, ego: EgoMotion) -> Step {
         let times = self.times(scan);
         let last = self.motion.twist;

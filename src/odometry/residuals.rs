@@ -20,8 +20,9 @@ impl Residuals {
     pub fn bent(&mut self, residual: f32, range: f32) -> f32 {
         /// What residuals differ by anyway, squared.
         const LARGER: f32 = 1.44;
-        /// Share of one match in what is usual, and the most that it counts for.
+        /// Share of one match in what is usual.
         const SHARE: f32 = 0.06;
+        /// One match counts for this many times what is usual at most.
         const MOST: f32 = 2.0;
         /// What of the end's rotation is seen across walls.
         const ACROSS: f32 = 0.22;

@@ -16,7 +16,9 @@ use super::{
 
 /// Written and read at a time (bytes): the largest unit of any flash there is.
 const PAGE: usize = 256;
+/// What a header begins with.
 const MAGIC: [u8; 4] = *b"BFSM";
+/// Of the image: another one is refused.
 const VERSION: u16 = 2;
 /// Bytes of a header in its page.
 const HEADER: usize = 36;
