@@ -10,6 +10,7 @@ pub mod clock;
 pub mod field;
 pub mod lscan;
 pub mod mirror;
+pub mod mount;
 pub mod no_return;
 pub mod order;
 pub mod pairs;

@@ -6,6 +6,8 @@ pub mod mcap;
 pub mod picture;
 pub mod relations;
 #[cfg(not(target_family = "wasm"))]
+pub mod ros;
+#[cfg(not(target_family = "wasm"))]
 pub mod rosbag;
 #[cfg(not(target_family = "wasm"))]
 pub mod run;

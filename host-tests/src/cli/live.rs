@@ -16,6 +16,7 @@ use beamfix_sim::TruePose;
 use host_tests::bringup;
 use host_tests::decode::{WithParser, with_parser};
 use host_tests::formats::capture::{Content, Piece, Recorder};
+use host_tests::formats::mount;
 use host_tests::pipeline::{Pieces, config};
 use host_tests::report::hash::PoseHash;
 use host_tests::report::terminal::View;
@@ -24,7 +25,6 @@ use host_tests::size::{self, SIZES};
 use serde_json::json;
 
 use super::output;
-use super::replay::mount;
 
 /// Follow a lidar on a serial line of this computer: starts it, finds poses from scan to scan, and draws scan, path and
 /// pose in the terminal (a line where there is none).
@@ -39,7 +39,7 @@ pub struct Args {
     #[arg(long, value_name = "BAUD")]
     baud: Option<u32>,
     /// The lidar's place on the robot (m, m, deg); `,down` after it for one that hangs head down.
-    #[arg(long, value_name = "X,Y,DEG[,down]", value_parser = mount, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,DEG[,down]", value_parser = mount::parse, allow_hyphen_values = true)]
     mount: Option<Mount>,
     /// Write the lidar's bytes here, for `replay`.
     #[arg(long, value_name = "FILE")]

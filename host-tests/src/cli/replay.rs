@@ -16,8 +16,8 @@ use serde_json::{Value, json};
 
 use super::output;
 use super::prior::Prior;
+pub use args::Args;
 use args::Mode;
-pub use args::{Args, mount};
 
 /// Replays the log.
 pub fn run(args: &Args) -> Result<ExitCode> {

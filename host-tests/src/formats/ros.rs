@@ -4,8 +4,8 @@
 //! last beam.
 
 pub mod bag;
-mod decoder;
-mod message;
+pub mod decoder;
+pub mod message;
 mod tree;
 
 use anyhow::{Result, bail};

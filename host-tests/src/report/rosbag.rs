@@ -3,32 +3,27 @@
 //! Topics: `/scan`, `/odom` where there are wheels, `/pose` for the estimate, `/ground_truth` where it is known, `/tf`
 //! (`map`, `odom`, `base_link`, as REP 105 has them), `/tf_static` for the lidar's mount, and `/map` at the end.
 
-mod message;
 mod sweep;
 
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, anyhow};
-use beamfix::geometry::Pose;
-use beamfix::grid::occupancy::{self, Cell};
+use anyhow::{Context, Result};
 use beamfix::scan::{Mount, NoReturn};
 use serde::Serialize;
 
-use self::message::{
-    Covariance, Estimate, Header, LaserScan, OccupancyGrid, Odometry, Placed, Time, Transform,
-};
 use self::sweep::Sweep;
 use crate::formats::Recorded;
 use crate::formats::ros_map::Map;
 use crate::report::mcap::next_header;
+use crate::report::ros::message::{self, Covariance, Estimate, LaserScan, Odometry};
+use crate::report::ros::{
+    LIDAR, MAP, ODOM, ROBOT, cdr, header, mounted, not_known, occupied, placed, six_by_six, stamp,
+    transform,
+};
 use crate::report::track::At;
 
-const MAP: &str = "map";
-const ODOM: &str = "odom";
-const ROBOT: &str = "base_link";
-const LIDAR: &str = "laser";
 /// Name of the file in the folder.
 const FILE: &str = "run_0.mcap";
 
@@ -204,7 +199,9 @@ impl RosBag {
         let estimate = Estimate {
             header: header(end, MAP),
             pose: placed(at.estimate),
-            covariance: at.covariance.map_or(Covariance::default(), six_by_six),
+            covariance: at
+                .covariance
+                .map_or(not_known(), |known| six_by_six(known.to_array())),
         };
         self.write(POSE, now, &estimate)?;
         if let Some(truth) = at.truth {
@@ -221,21 +218,7 @@ impl RosBag {
     /// Writes what was seen as a map.
     pub fn push_map(&mut self, map: &Map) -> Result<()> {
         let now = self.span.map_or(0, |(_, last)| last);
-        let shape = map.shape();
-        let value = |&byte: &u8| match occupancy::cell(byte) {
-            Cell::Free => 0,
-            Cell::Occupied => 100,
-            Cell::Unknown => -1,
-        };
-        let grid = OccupancyGrid {
-            header: header(stamp(now / 1000), MAP),
-            map_load_time: stamp(now / 1000),
-            resolution: shape.resolution(),
-            width: u32::from(shape.width()),
-            height: u32::from(shape.height()),
-            origin: placed(shape.origin()),
-            data: map.cells().iter().map(value).collect(),
-        };
+        let grid = occupied(map, stamp(now / 1000));
         self.write(GRID, now, &grid)
     }
 
@@ -266,8 +249,7 @@ impl RosBag {
         topic.count += 1;
         // Little-endian CDR.
         let mut bytes = vec![0, 1, 0, 0];
-        let body = cdr_encoding::to_vec::<_, byteorder::LittleEndian>(message);
-        bytes.extend(body.map_err(|error| anyhow!("{}: {error}", topic.name))?);
+        bytes.extend(cdr(message).with_context(|| topic.name)?);
         let header = next_header(channel_id, &mut self.sequence, time);
         self.span = Some((self.span.map_or(time, |(first, _)| first), time));
         self.writer.write_to_known_channel(&header, &bytes)?;
@@ -313,69 +295,4 @@ fn quality(is_latched: bool) -> String {
          lifespan:\n    {forever}\n  liveliness: 1\n  liveliness_lease_duration:\n    {forever}\n  \
          avoid_ros_namespace_conventions: false\n"
     )
-}
-
-fn stamp(us: u64) -> Time {
-    Time {
-        sec: (us / 1_000_000) as i32,
-        nanosec: (us % 1_000_000) as u32 * 1000,
-    }
-}
-
-fn header(stamp: Time, frame_id: &str) -> Header<'_> {
-    Header { stamp, frame_id }
-}
-
-fn placed(pose: Pose) -> Placed {
-    let half = 0.5 * f64::from(pose.theta);
-    Placed {
-        position: [f64::from(pose.x), f64::from(pose.y), 0.0],
-        orientation: [0.0, 0.0, libm::sin(half), libm::cos(half)],
-    }
-}
-
-/// The lidar on the robot: turned about z, then over, where it hangs head down.
-fn mounted(mount: Mount) -> Placed {
-    let Placed {
-        position,
-        orientation: [x, y, z, w],
-    } = placed(mount.robot_from_lidar);
-    let orientation = if mount.upside_down {
-        [w, z, 0.0, 0.0]
-    } else {
-        [x, y, z, w]
-    };
-    Placed {
-        position,
-        orientation,
-    }
-}
-
-fn transform<'a>(stamp: Time, [parent, child]: [&'a str; 2], place: Placed) -> Transform<'a> {
-    Transform {
-        header: header(stamp, parent),
-        child_frame_id: child,
-        transform: place,
-    }
-}
-
-/// Of x, y and the heading; a robot on a floor knows nothing of the rest.
-fn six_by_six(covariance: beamfix::linalg::Covariance) -> Covariance {
-    let c = covariance.0;
-    let [xx, xy, xt, yy, yt, tt] = [c.xx, c.xy, c.xt, c.yy, c.yt, c.tt].map(f64::from);
-    let mut six = Covariance::default();
-    for (row, column, value) in [
-        (0, 0, xx),
-        (0, 1, xy),
-        (1, 0, xy),
-        (0, 5, xt),
-        (5, 0, xt),
-        (1, 1, yy),
-        (1, 5, yt),
-        (5, 1, yt),
-        (5, 5, tt),
-    ] {
-        six[row][column] = value;
-    }
-    six
 }

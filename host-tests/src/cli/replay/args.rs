@@ -11,6 +11,7 @@ use beamfix::scan::Mount;
 use beamfix::sensor_model::likelihood_field::LikelihoodField;
 use beamfix_sim::TruePose;
 use clap::ValueEnum;
+use host_tests::formats::mount;
 use host_tests::formats::order::Order;
 use host_tests::formats::trajectory::{Format, Trajectory};
 use host_tests::formats::{Log, Options, Recorded};
@@ -77,10 +78,10 @@ pub struct Args {
     pub picture: Option<PathBuf>,
     /// The lidar's place on the robot (m, m, deg), where the log does not tell or tells it wrong; `,down` after it for a
     /// lidar that hangs head down.
-    #[arg(long, value_name = "X,Y,DEG[,down]", value_parser = mount, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,DEG[,down]", value_parser = mount::parse, allow_hyphen_values = true)]
     pub mount: Option<Mount>,
     /// Where the robot starts in the map (m, m, deg). Default: it finds itself.
-    #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,DEG", value_parser = mount::pose, allow_hyphen_values = true)]
     pub start: Option<Pose>,
     /// Stop after so many scans.
     #[arg(long, value_name = "N")]
@@ -261,25 +262,5 @@ impl Leave {
             output::remark(&remarks);
         }
         Ok(())
-    }
-}
-
-/// `x,y,degrees` or `x,y,degrees,down`.
-pub fn mount(text: &str) -> Result<Mount> {
-    let place = text.strip_suffix(",down");
-    Ok(Mount {
-        robot_from_lidar: pose(place.unwrap_or(text))?,
-        upside_down: place.is_some(),
-    })
-}
-
-/// `x,y,degrees`.
-fn pose(text: &str) -> Result<Pose> {
-    let numbers: Vec<f32> = text.split(',').map(str::parse).collect::<Result<_, _>>()?;
-    match numbers[..] {
-        [x, y, degrees] if numbers.iter().all(|v| v.is_finite()) => {
-            Ok(Pose::new(x, y, degrees.to_radians()))
-        }
-        _ => bail!("three numbers wanted: x,y,degrees"),
     }
 }

@@ -207,3 +207,27 @@ pub struct OccupancyGrid<'a> {
     /// Row by row from there: 0 free to 100 occupied, -1 unknown.
     pub data: Vec<i8>,
 }
+
+/// `diagnostic_msgs/DiagnosticArray`.
+#[derive(Debug, Clone, Serialize)]
+pub struct Diagnostics<'a> {
+    /// When.
+    pub header: Header<'a>,
+    /// Of each part.
+    pub status: Vec<Status<'a>>,
+}
+
+/// `diagnostic_msgs/DiagnosticStatus`.
+#[derive(Debug, Clone, Serialize)]
+pub struct Status<'a> {
+    /// 0 good, 1 a warning, 2 an error.
+    pub level: u8,
+    /// Of the part.
+    pub name: &'a str,
+    /// What it is about.
+    pub message: String,
+    /// Which one of several.
+    pub hardware_id: String,
+    /// Names and figures.
+    pub values: Vec<(&'a str, String)>,
+}
