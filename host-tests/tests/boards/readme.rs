@@ -1,6 +1,14 @@
-//! The README's figures are those that `card` prints.
+//! The README's figures are those that commands print and sources have.
 
+use beamfix::lidar::parsers::Ldrobot;
+use beamfix::matching::icp::{IcpConfig, Search};
+use beamfix::odometry::Odometry;
+use beamfix::pipeline::Pipeline;
 use host_tests::board::{card::Card, real_card::RealCard};
+use host_tests::formats::pairs::{self, Pairs};
+use host_tests::matcher::Matcher;
+use host_tests::report::score::{Score, mean};
+use host_tests::{shared, size, sized};
 
 #[test]
 fn the_cost_table_is_that_of_the_golden_cards() {
@@ -32,5 +40,242 @@ fn the_table_of_boards_is_what_was_measured() {
             "{}: cargo run --release -- card --bless",
             board.board
         );
+    }
+}
+
+const README: &str = include_str!("../../../README.md");
+
+fn has(text: &str) {
+    // Lines are broken anywhere.
+    let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        words(README).contains(&words(text)),
+        "README.md does not say: {text}"
+    );
+}
+
+/// Whether a source still says what the README takes from it.
+fn says(source: &str, line: &str) {
+    assert!(source.contains(line), "no longer there: {line}");
+}
+
+#[test]
+fn releases_and_sizes_are_those_of_the_manifest_and_the_compiler() {
+    let manifest = include_str!("../../../Cargo.toml");
+    says(manifest, "rust-version = \"1.88\"");
+    has("Rust 1.88 or newer");
+    says(manifest, "embedded-io = { version = \"0.7\"");
+    says(manifest, "embedded-io-async = { version = \"0.7\"");
+    says(manifest, "embedded-hal-nb = { version = \"1\"");
+    has("`embedded-io` 0.7 (blocking), `embedded-io-async` 0.7, `embedded-hal-nb` 1.");
+    type Robot = Pipeline<Ldrobot, Odometry<456>, 456>;
+    let kilobytes = (size_of::<Robot>() as f64 / 1024.0).round();
+    has(&format!(
+        "type Robot = Pipeline<Ldrobot, Odometry<456>, 456>; // give it a place in a static: {kilobytes} KB"
+    ));
+}
+
+#[test]
+fn assumptions_are_those_that_the_cards_are_reckoned_with() {
+    let real = include_str!("../../src/board/real.rs");
+    says(real, "const CORTEX_M4: f64 = 1.25;");
+    says(real, "const CORTEX_M0: f64 = 1.5;");
+    has(
+        "takes 1.25 of them for each on a Cortex-M4F, a Cortex-M33 and an RV32, 1.5 on a Cortex-M0+",
+    );
+    says(real, "const RATE: f64 = 10.0;");
+    says(real, "const BYTE: f64 = 600.0;");
+    says(real, "const BYTE_BY_AWAIT: f64 = 1250.0;");
+    has(
+        "for 10 revolutions a second and includes 600 instructions for each byte received, with embassy 1250",
+    );
+    says(include_str!("../../src/board/card.rs"), "seconds: 20.0,");
+    has("over a simulated drive of 20 s");
+    says(
+        include_str!("../common/figures.rs"),
+        "const ALLOWED: f64 = 1.02;",
+    );
+    has("a rise by more than 2 % fails the tests");
+    let slam = include_str!("../../src/board/slam.rs");
+    says(slam, "ram_bytes: 192 << 10,");
+    says(slam, "ram_bytes: 512 << 10,");
+    has("an emulated core with 192 or 512 KB of RAM");
+    assert_eq!(beamfix_sim::place::NAMES.len(), 9);
+    has("`simulate --world maze` drives elsewhere (nine places,");
+}
+
+#[test]
+fn the_buffer_of_a_uart_is_that_of_the_longest_match() {
+    let boards: Vec<RealCard> =
+        serde_json::from_str(include_str!("../../golden/boards.json")).expect("a list of cards");
+    // Ten bits a byte.
+    let rate = beamfix_app::LIDAR_BAUD / 10;
+    let during = |name: &str| {
+        let board = boards.iter().find(|board| board.board == name);
+        let ms = board.expect("a card").longest_ms;
+        // As the table has it.
+        (ms * 10.0).round() / 10.0 * 1e-3 * f64::from(rate)
+    };
+    has(&format!(
+        "its {rate} bytes a second (LD06, 230 400 baud) over the longest match below are {:.0} bytes on a Pico, {:.0} on a \
+         NUCLEO-F446",
+        during("pico"),
+        during("nucleo-f446")
+    ));
+    says(include_str!("../../../boards/rp/src/lib.rs"), "Ring<4096>");
+    has("`boards/` have rings of 4096 bytes");
+}
+
+/// The traits that a HAL's UART has, by the lock file of a firmware with it.
+fn traits_of(lock: &str, hal: &str) -> (String, [Vec<String>; 3]) {
+    let package = |name: &str| {
+        let head = format!("name = \"{name}\"\n");
+        let packages = lock.split("[[package]]").filter(move |p| p.contains(&head));
+        packages.map(str::to_owned).collect::<Vec<_>>()
+    };
+    let release = |package: &str| {
+        let version = package.split("version = \"").nth(1).expect("a version");
+        let mut parts = version.split(['.', '"']);
+        let [major, minor] = [(); 2].map(|()| parts.next().expect("a number"));
+        format!("{major}.{minor}")
+    };
+    let [own] = &package(hal)[..] else {
+        panic!("one {hal}");
+    };
+    let needs = |name: &str| {
+        let all = package(name);
+        let mut found: Vec<String> = all
+            .iter()
+            .filter(|one| {
+                let version = one.split("version = \"").nth(1).unwrap_or_default();
+                let version = version.split('"').next().unwrap_or_default();
+                own.contains(&format!("\"{name} {version}\""))
+                    || own.contains(&format!("\"{name}\""))
+            })
+            .map(|one| release(one))
+            .collect();
+        found.sort();
+        found
+    };
+    (
+        release(own),
+        ["embedded-io", "embedded-io-async", "embedded-hal-nb"].map(needs),
+    )
+}
+
+#[test]
+fn hals_have_the_traits_that_the_table_says() {
+    let locks = [
+        (
+            "rp2040-hal",
+            include_str!("../../../boards/pico/Cargo.lock"),
+        ),
+        (
+            "rp235x-hal",
+            include_str!("../../../boards/pico2/Cargo.lock"),
+        ),
+        (
+            "embassy-rp",
+            include_str!("../../../boards/pico-embassy/Cargo.lock"),
+        ),
+        (
+            "embassy-nrf",
+            include_str!("../../../boards/nrf52840-dk/Cargo.lock"),
+        ),
+        (
+            "esp-hal",
+            include_str!("../../../boards/esp32-c3/Cargo.lock"),
+        ),
+        (
+            "stm32f4xx-hal",
+            include_str!("../../../boards/nucleo-f446/Cargo.lock"),
+        ),
+    ];
+    for (hal, lock) in locks {
+        let (version, traits) = traits_of(lock, hal);
+        let name = format!("{hal} {version}");
+        let row = README
+            .lines()
+            .find(|line| line.starts_with('|') && line.contains(&name));
+        let row = row.unwrap_or_else(|| panic!("README.md has no row of {name}"));
+        let cells: Vec<&str> = row.split('|').skip(2).take(3).collect();
+        let names = ["embedded-io", "embedded-io-async", "embedded-hal-nb"];
+        for ((cell, name), releases) in cells.iter().zip(names).zip(&traits) {
+            let wanted = match releases.is_empty() {
+                true => String::new(),
+                false => format!("`{name}` {}", releases.join(" and ")),
+            };
+            let told = cell.trim().split(':').next().unwrap_or_default();
+            assert_eq!(told, wanted, "{hal}: {row}");
+        }
+    }
+}
+
+/// Of each hundred, to a tenth; all of them without.
+fn percent(part: usize, of: usize) -> String {
+    match 100.0 * part as f64 / of as f64 {
+        100.0 => "100".to_owned(),
+        share => format!("{share:.1}"),
+    }
+}
+
+/// The disturbed guesses of a list.
+fn scored<const N: usize>(list: &Pairs, config: &IcpConfig) -> Score {
+    let mut matcher = Matcher::<N>::new();
+    let mut score = Score::default();
+    for pair in list.pairs.iter().filter(|pair| pair.level > 0) {
+        let found = matcher.run(list, pair, config, |_| ());
+        let pose = found.as_ref().map_or(pair.guess, |found| found.pose);
+        score.push(pair.level, pose, pair.truth, found.is_ok());
+    }
+    score
+}
+
+#[test]
+fn the_table_of_accuracy_is_what_the_lists_give() {
+    // As the command `pairs` has it.
+    let config = IcpConfig {
+        search: Search::Local,
+        ..IcpConfig::DEFAULT
+    };
+    let mut row = "| beamfix |".to_owned();
+    let mut error = String::new();
+    for (scans, list) in [
+        ("intel", "intel_cons"),
+        ("fr079", "fr079_cons"),
+        ("sim", "sim_consec"),
+    ] {
+        let (Some(scans), Some(list)) = (
+            shared::file(&format!("pairs/host/scans_{scans}.txt.gz")),
+            shared::file(&format!("pairs/host/pairs_{list}.csv.gz")),
+        ) else {
+            return;
+        };
+        let list = pairs::read(&scans, &list).expect("a list of pairs");
+        let size = size::fitting(list.scans.iter().map(|scan| &scan[..]));
+        let score = sized!(size, scored(&list, &config));
+        let levels = score.0.values();
+        let right: Vec<String> = levels.map(|of| percent(of.right, of.pairs)).collect();
+        row += &format!(" {} |", right.join(" / "));
+        let first = &score.0[&1];
+        let (mm, degrees) = (1e3 * mean(&first.metres), mean(&first.degrees));
+        error = format!(" {mm:.1} mm, {degrees:.3}° |");
+    }
+    has(&(row + &error));
+    // The others' figures, as they were measured.
+    let Some(peers) = shared::file("PEERS.md") else {
+        return;
+    };
+    let peers = std::fs::read_to_string(peers)
+        .expect("text")
+        .replace(" deg", "°");
+    let rows = ["CSM, point to line", "Karto,", "Hector,"];
+    for row in README.lines().filter(|line| {
+        rows.iter()
+            .any(|name| line.starts_with(&format!("| {name}")))
+    }) {
+        for cell in row.split('|').skip(2).map(str::trim) {
+            assert!(peers.contains(cell), "{cell}: {row}");
+        }
     }
 }
