@@ -1,8 +1,10 @@
 //! `beamfix-bridge`: from a serial line to ROS 2 and back.
 
+use std::convert::Infallible;
 use std::env;
 use std::io::{ErrorKind, Read, Write};
 use std::path::PathBuf;
+use std::process::ExitCode;
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::{Context, Result, ensure};
@@ -52,8 +54,14 @@ enum Doing {
 /// Nothing comes for so long where something is wrong: four revolutions of the slowest lidar.
 const SILENCE: Duration = Duration::from_secs(2);
 
-fn main() -> Result<()> {
-    let args = Args::parse();
+fn main() -> ExitCode {
+    let Err(error) = run(&Args::parse());
+    eprintln!("beamfix-bridge: {error:#}");
+    ExitCode::from(2)
+}
+
+/// Until something fails.
+fn run(args: &Args) -> Result<Infallible> {
     let bare = |topic: &str| topic.trim_start_matches('/').to_owned();
     ensure!(
         bare(&args.odom) != bare(&args.wheels),

@@ -359,3 +359,23 @@ fn a_lidar_that_stands_upright_is_only_turned() {
     let [x, y, z, w] = mount(told, 0).transform.orientation;
     assert!(x == 0.0 && y == 0.0 && (z.abs() - 1.0).abs() < 1e-7 && w.abs() < 1e-7);
 }
+
+#[test]
+fn what_cannot_be_is_said_in_one_line() {
+    for (arguments, word) in [
+        (&["/nowhere/at/all"][..], "/nowhere/at/all"),
+        (&["/dev/null", "--odom", "wheel_odom"], "the same topic"),
+        (&["/dev/null", "--map", "/nowhere.yaml"], "/nowhere.yaml"),
+    ] {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_beamfix-bridge"))
+            .args(arguments)
+            .output()
+            .expect("the bridge");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(
+            said.trim_end().lines().count() == 1 && said.contains(word),
+            "{said}"
+        );
+    }
+}
