@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! bytes ─▶ packet ─▶ beams ─▶ scan ─▶ points ─▶ match ─▶ pose
-//!       lidar               scan               matching    odometry | localization
+//!       lidar               scan               matching    odometry | localization | slam
 //! └────────────────────────── pipeline ──────────────────────────┘
 //! ```
 //!
@@ -32,9 +32,10 @@
 //! | feature | what it adds |
 //! | --- | --- |
 //! | `embedded-io`, `embedded-io-async`, `embedded-hal-nb` | a lidar read over that crate's UART trait |
-//! | `embedded-storage` | a map saved in flash, with `internals` so far |
+//! | `embedded-storage` | with `slam`: a map saved in flash and loaded again |
 //! | `defmt` | `defmt::Format` on the public types |
 //! | `modular` | ICP with every stage a choice, for study: what the fast one does, step by step |
+//! | `slam` | maps as estimators of the pipeline: `Mapper64k`, which rolls with the robot, and `Mapper192k` and `Mapper512k`, which close loops |
 //! | `internals` | the workings, for this project's own tests; nothing in it is stable |
 #![no_std]
 #![forbid(unsafe_code)]
@@ -67,10 +68,9 @@ pub mod odometry;
 pub mod pipeline;
 pub mod scan;
 pub mod sensor_model;
-// Only the tool runs it so far.
-#[cfg(not(feature = "internals"))]
+#[cfg(not(feature = "slam"))]
 pub(crate) mod slam;
-#[cfg(feature = "internals")]
+#[cfg(feature = "slam")]
 pub mod slam;
 
 pub use config::ConfigError;

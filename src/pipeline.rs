@@ -21,15 +21,19 @@
 mod estimator;
 mod gyro;
 mod map_localizer;
-#[cfg(feature = "internals")]
+#[cfg(feature = "slam")]
 mod mapper;
+#[cfg(feature = "slam")]
+mod rolling;
 mod tracker;
 mod wheels;
 
 pub use estimator::{Estimate, Estimator, Verdict};
 pub use map_localizer::{Located, MapLocalizer};
-#[cfg(feature = "internals")]
+#[cfg(feature = "slam")]
 pub use mapper::{Mapped, Mapper, Mapper192k, Mapper512k};
+#[cfg(feature = "slam")]
+pub use rolling::{Mapper64k, RollingMapper, RollingStep};
 pub use tracker::{Revolution, Tracker};
 
 use crate::lidar::{Packet, Protocol};

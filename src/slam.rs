@@ -6,6 +6,7 @@
 //! | find earlier keyframes that may see the same place | `loops`, `drift` |
 //! | find the place of a robot that was carried | `recognition`, `joining` |
 //! | match against what those around that place see together, check, wait for confirmation | `closing`, `verify` |
+//! | a map without loops that rolls with the robot, in less memory | `rolling` |
 //! | solve the pose graph, loops weighted by how well they agree | `solver`, `graph` |
 //! | remove the keyframe that tells least where the memory is full | `room`, `pruning` |
 //! | draw the map from the keyframes | `rendering` |
@@ -16,7 +17,7 @@
 //!
 //! The map is its keyframes, poses and scans of two bytes a point, and the motions measured between them. A scan of now is
 //! matched with what up to eight keyframes around a place saw, as one scan (see
-//! [`virtual_scan`](crate::matching::virtual_scan)): one keyframe alone overlaps too little where a lidar sees to one side
+//! `matching::virtual_scan`): one keyframe alone overlaps too little where a lidar sees to one side
 //! only. Where the graph knows to 10 cm (σ) where the robot is, a match alone is a loop; elsewhere two others must close a
 //! cycle with it. Loops that contradict the rest later lose their weight in the solution (dynamic covariance scaling).
 //!
@@ -32,15 +33,23 @@ mod config;
 mod drift;
 #[cfg(feature = "embedded-storage")]
 mod flash;
+#[cfg(feature = "internals")]
 pub mod graph;
+#[cfg(not(feature = "internals"))]
+mod graph;
+mod growth;
 mod joining;
 mod keeping;
 mod loops;
 mod pruning;
 mod recognition;
 mod rendering;
+mod rolling;
 mod room;
+#[cfg(feature = "internals")]
 pub mod solver;
+#[cfg(not(feature = "internals"))]
+mod solver;
 mod store;
 #[cfg(feature = "embedded-storage")]
 mod stored;
@@ -52,6 +61,7 @@ pub use config::SlamConfig;
 #[cfg(feature = "embedded-storage")]
 pub use flash::StorageError;
 pub use pruning::Merged;
+pub(crate) use rolling::{RollingMap, Told};
 
 use heapless::{Deque, Vec};
 
@@ -110,7 +120,7 @@ pub struct Counters {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Placed {
-    /// Number of the keyframe, as in [`graph::Node::id`].
+    /// Number of the keyframe, as [`Slam::keyframes`] has it.
     pub keyframe: u32,
     /// The lidar in its frame.
     pub motion: Pose,
@@ -225,7 +235,14 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
         }
     }
 
+    /// The keyframes of the map and of submaps not joined to it so far: number, slot, and pose of the lidar (m, rad).
+    pub fn keyframes(&self) -> impl Iterator<Item = (u32, u16, Pose)> + '_ {
+        let nodes = self.graph.nodes();
+        nodes.map(|(slot, node)| (node.id, slot, node.pose))
+    }
+
     /// The keyframes' poses and what is known of the motions between them.
+    #[cfg(feature = "internals")]
     #[must_use]
     pub const fn graph(&self) -> &Graph<K, E> {
         &self.graph

@@ -4,7 +4,9 @@ use std::{env, fs, path::Path};
 fn main() {
     let out = env::var("OUT_DIR").expect("set by cargo");
     let memory = fs::read_to_string("memory.x").expect("memory.x beside this file");
-    let ram = if env::var_os("CARGO_FEATURE_TIER_192K").is_some() {
+    let ram = if env::var_os("CARGO_FEATURE_TIER_64K").is_some() {
+        "64K"
+    } else if env::var_os("CARGO_FEATURE_TIER_192K").is_some() {
         "192K"
     } else if env::var_os("CARGO_FEATURE_TIER_512K").is_some() {
         "512K"

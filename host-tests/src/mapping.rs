@@ -9,7 +9,7 @@ use beamfix::geometry::{EgoMotion, Pose};
 use beamfix::grid::occupancy::{self, UpdateConfig};
 use beamfix::grid::{Grid, Shape};
 use beamfix::odometry::{OdometryConfig, Refusal};
-use beamfix::pipeline::{Estimator, Mapped, Mapper, Mapper192k, Mapper512k, Tracker};
+use beamfix::pipeline::{Estimator, Mapped, Mapper, Mapper64k, Mapper192k, Mapper512k, Tracker};
 use beamfix::scan::Scan;
 use beamfix::slam::{Counters, Merged, Placed, SLICE, Slam, SlamConfig};
 use beamfix_sim::Noise;
@@ -20,6 +20,8 @@ use crate::pipeline::follow;
 /// The memory configurations that map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tier {
+    /// [`Mapper64k`]: a map that rolls with the robot, without loops.
+    Of64k,
     /// [`Mapper192k`].
     Of192k,
     /// [`Mapper512k`].
@@ -90,6 +92,7 @@ pub struct MappedScan {
 /// Replays a log; `tick` is called for each scan.
 pub fn run(log: &Log, settings: &Settings, tick: &mut dyn FnMut()) -> Result<Map> {
     match settings.tier {
+        Tier::Of64k => rolling(log, settings, tick),
         Tier::Of192k => replay(
             log,
             settings,
@@ -103,6 +106,27 @@ pub fn run(log: &Log, settings: &Settings, tick: &mut dyn FnMut()) -> Result<Map
             tick,
         ),
     }
+}
+
+/// Replays a log through the rolling map: its poses stay as they come.
+fn rolling(log: &Log, settings: &Settings, tick: &mut dyn FnMut()) -> Result<Map> {
+    let mut map = Map::default();
+    let mapper = Mapper64k::new(settings.odometry);
+    let followed = follow::<_, 512>(log, settings.scans, mapper, &mut |scan, pose, step| {
+        tick();
+        map.scans.push(MappedScan {
+            stamp: scan.stamp.clone(),
+            online: pose,
+            is_located: true,
+            pose,
+            is_measured: step.is_measured(),
+        });
+        Ok(())
+    })?;
+    map.refused_beams = followed.refused_beams;
+    let bytes = size_of::<Tracker<Mapper64k, 512>>();
+    map.bytes = (bytes, bytes);
+    Ok(map)
 }
 
 /// A mapper that remembers where scans were placed and which keyframes were merged into which.

@@ -160,7 +160,7 @@ impl<E: Estimator<N>, const N: usize> Following<'_, E, N> {
 }
 
 /// A whole scan, and the wheels at its end.
-fn push_scan<E: Estimator<N>, const N: usize>(
+pub(crate) fn push_scan<E: Estimator<N>, const N: usize>(
     tracker: &mut Tracker<E, N>,
     beams: &[Beam],
     wheels: Option<Pose>,

@@ -14,7 +14,33 @@ pub type Mapper192k = Mapper<720, 224, 512, 880, 144, 360>;
 /// Mapping for a controller with 512 KB of RAM: 560 keyframes of 180 points, 1024 beams a revolution.
 pub type Mapper512k = Mapper<1024, 560, 1400, 2800, 180, 720>;
 
-/// An [`Odometry`] of N beams a revolution, and a [`Slam`] of K keyframes, E edges, L blocks, B points and V directions.
+/// An [`Odometry`] of N beams a revolution, and a [`Slam`] of K keyframes, E edges, L blocks, B points and V directions: an
+/// estimator for a [`Tracker`](super::Tracker) or a [`Pipeline`](super::Pipeline), best in a static.
+///
+/// A scan costs what the odometry does; all else is [`work`](Estimator::work), to be called between scans until it says that
+/// nothing is left. The frame is the one in which the robot started.
+///
+/// ```
+/// use beamfix::{
+///     Beam, OdometryConfig, Tracker,
+///     pipeline::{Estimator as _, Mapper192k},
+///     scan::{Bearing, Range},
+///     slam::{SLICE, SlamConfig},
+/// };
+/// let mapper = Mapper192k::new(OdometryConfig::DEFAULT, SlamConfig::DEFAULT);
+/// let mut robot = Box::new(Tracker::<_, 720>::new(mapper)); // on a board a static
+/// // A round room of 3 m, seen once a beam of 2 degrees.
+/// let beams = (0..180).map(|k| Beam {
+///     bearing: Bearing(k * 364),
+///     range: Range::from_mm(3000),
+///     time_us: u32::from(k),
+///     quality: 0,
+/// });
+/// robot.push_scan(beams, |revolution| assert!(revolution.step.is_located));
+/// while !robot.estimator_mut().work(SLICE) {}
+/// let map = robot.estimator().slam();
+/// assert_eq!(map.keyframes().count(), 1);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Mapper<
     const N: usize,

@@ -3,6 +3,7 @@
 use super::{
     Last, Placed, Slam,
     graph::{Edge, Kind, Node, Slot},
+    growth::growth,
     pruning,
     store::PackedScan,
     task::Work,
@@ -228,22 +229,12 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
             self.config.min_chain_heading_sigma,
         );
         let least = Covariance(Sym3::diagonal(far * far, far * far, turned * turned));
-        let (dx, dy) = (odometry.x - last.odometry.x, odometry.y - last.odometry.y);
-        let before = last.covariance.transported(dx, dy).0.scaled(-1.0);
-        let back = Pose {
-            x: 0.0,
-            y: 0.0,
-            theta: -last.odometry.theta,
-        };
-        let grown = Covariance(covariance.0.plus(&before)).rotated(back);
-        // A difference of two covariances need not be one. Where it is negative in some direction, even by less than the least
-        // error, the sum with that would tell of a motion known to fractions of a millimetre.
+        // Where it is negative by less than the least error, the sum with that would tell of a motion known to fractions of a
+        // millimetre.
         let half = Covariance(least.0.scaled(0.5));
-        let is_growth = grown.plus(&half).information().is_some();
-        let Sym3 { xx, yy, tt, .. } = grown.0;
-        let [xx, yy, tt] = [xx, yy, tt].map(|variance| math::max(variance, 0.0));
-        let axes = Covariance(Sym3::diagonal(xx, yy, tt));
-        let grown = if is_growth { grown } else { axes };
+        let before = (last.odometry, &last.covariance);
+        let now = (odometry, covariance);
+        let [grown, axes] = growth(before, now, -last.odometry.theta, &half);
         let information = [grown.plus(&least), axes.plus(&least), NOTHING]
             .iter()
             .filter_map(Covariance::information)

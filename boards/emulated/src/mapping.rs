@@ -8,7 +8,7 @@ use beamfix::{
     geometry::Pose,
     grid::{Grid, Shape, occupancy::UpdateConfig},
     odometry::OdometryConfig,
-    pipeline::{Estimator as _, Mapper, Tracker},
+    pipeline::{Estimator as _, Mapper, RollingMapper, Tracker},
     scan::{Beam, Bearing, Range},
     slam::{SLICE, SlamConfig},
 };
@@ -22,6 +22,7 @@ const BEAMS: usize = 64;
 /// The memory that it needs.
 pub struct Mapping {
     tracker: Tracker<Mapper<BEAMS, 8, 16, 32, 48, 64>, BEAMS>,
+    rolling: Tracker<RollingMapper<BEAMS, 8, 48, 64>, BEAMS>,
     cells: [u8; 256],
 }
 
@@ -31,6 +32,7 @@ impl Mapping {
     pub const fn new() -> Self {
         Self {
             tracker: Tracker::new(Mapper::new(OdometryConfig::DEFAULT, SlamConfig::DEFAULT)),
+            rolling: Tracker::new(RollingMapper::new(OdometryConfig::DEFAULT)),
             cells: [0; 256],
         }
     }
@@ -50,6 +52,10 @@ impl Mapping {
             time_us: range,
             quality: 0,
         });
+        self.rolling.push_scan(beams.clone(), |revolution| {
+            black_box(revolution.step.pose);
+        });
+        self.rolling.estimator_mut().work(SLICE);
         self.tracker.push_wheels(range, pose);
         let mut x = 0.0;
         self.tracker

@@ -7,7 +7,8 @@
 //! At the end the longest piece of work, the bytes of the tier's statics, the peak stack, 0, 0.
 
 use beamfix::{
-    pipeline::{Estimate as _, Estimator as _, Mapper, Tracker},
+    geometry::Pose,
+    pipeline::{Estimate as _, Estimator, Mapper, RollingMapper, Tracker},
     scan::Beam,
     slam::SLICE,
 };
@@ -22,16 +23,33 @@ use crate::{INPUT, Machine, OUTPUT, bench::pose_from, read_full, stack::Stack};
 /// Beams read at a time.
 const CHUNK: usize = 8;
 
+/// An estimator that maps, whose keyframes may move.
+pub trait Maps<const N: usize>: Estimator<N> {
+    /// The keyframes at the end: number and pose.
+    fn keyframes(&self) -> impl Iterator<Item = (u32, Pose)>;
+}
+
+impl<const N: usize, const K: usize, const E: usize, const L: usize, const B: usize, const V: usize>
+    Maps<N> for Mapper<N, K, E, L, B, V>
+{
+    fn keyframes(&self) -> impl Iterator<Item = (u32, Pose)> {
+        let keyframes = self.slam().keyframes();
+        keyframes.map(|(number, _, pose)| (number, pose))
+    }
+}
+
+impl<const N: usize, const K: usize, const B: usize, const V: usize> Maps<N>
+    for RollingMapper<N, K, B, V>
+{
+    /// They stay where they were first.
+    fn keyframes(&self) -> impl Iterator<Item = (u32, Pose)> {
+        core::iter::empty()
+    }
+}
+
 /// Maps what `input.bin` tells.
-pub fn run<
-    const N: usize,
-    const K: usize,
-    const E: usize,
-    const L: usize,
-    const B: usize,
-    const V: usize,
->(
-    tracker: &mut Tracker<Mapper<N, K, E, L, B, V>, N>,
+pub fn run<M: Maps<N>, const N: usize>(
+    tracker: &mut Tracker<M, N>,
     machine: &mut impl Machine,
     stack: &Stack,
 ) -> io::Result<()> {
@@ -76,11 +94,11 @@ pub fn run<
             break;
         }
     }
-    for (_, node) in mapper.slam().graph().nodes() {
-        let [x, y, theta] = [node.pose.x, node.pose.y, node.pose.theta].map(f32::to_bits);
-        write(&mut output, [node.id, x, y, theta, 0])?;
+    for (number, pose) in mapper.keyframes() {
+        let [x, y, theta] = [pose.x, pose.y, pose.theta].map(f32::to_bits);
+        write(&mut output, [number, x, y, theta, 0])?;
     }
-    let bytes = size_of::<Tracker<Mapper<N, K, E, L, B, V>, N>>() as u32;
+    let bytes = size_of::<Tracker<M, N>>() as u32;
     write(&mut output, [longest, bytes, stack.peak(), 0, 0])
 }
 

@@ -14,7 +14,13 @@ use crate::formats::Log;
 use crate::mapping::{self, Settings, Tier};
 use crate::report::hash::PoseHash;
 
-/// The emulated Cortex-M4F with the RAM of the tier of 192 KB.
+/// The emulated Cortex-M4F with the RAM of the tier of 64 KB.
+const M4F_64K: Board = Board {
+    firmware: BOARDS[0].firmware.with("tier-64k"),
+    ram_bytes: 64 << 10,
+    ..BOARDS[0]
+};
+/// Of 192 KB.
 const M4F_192K: Board = Board {
     firmware: BOARDS[0].firmware.with("tier-192k"),
     ram_bytes: 192 << 10,
@@ -74,6 +80,7 @@ impl Costs {
 /// Fails where one bit of a pose differs, and where statics and stack are more than the RAM of the tier.
 pub fn measure(tier: Tier, log: &Log, scans: usize) -> Result<Costs> {
     let board = match tier {
+        Tier::Of64k => M4F_64K,
         Tier::Of192k => M4F_192K,
         Tier::Of512k => M4F_512K,
     };

@@ -47,9 +47,10 @@ pub struct Args {
 
 fn tier(name: &str) -> Result<Tier> {
     match name {
+        "64k" => Ok(Tier::Of64k),
         "192k" => Ok(Tier::Of192k),
         "512k" => Ok(Tier::Of512k),
-        _ => bail!("192k or 512k"),
+        _ => bail!("64k, 192k or 512k"),
     }
 }
 

@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 use super::output;
 use super::prior::Prior;
 pub use args::Args;
-use args::Mode;
+use args::{Mode, Tier};
 
 /// Replays the log.
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -45,6 +45,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let done = match args.mode {
         Mode::Localize => localize::run(args, &log, size)?,
         Mode::Odometry => odometry::run(args, &log, (size, directions))?,
+        Mode::Slam if args.tier == Some(Tier::Middle) => {
+            odometry::run_rolling(args, &log, directions)?
+        }
         Mode::Slam => slam::run(args, &log, directions)?,
     };
     let name = args.log.display();

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Result, bail};
 use beamfix_sim::catalogue::{self, Entry, Must};
-use host_tests::report::scene::{self, Outcome};
+use host_tests::report::scene::{self, Outcome, Runs};
 use serde_json::{Value, json};
 
 use super::output;
@@ -29,6 +29,9 @@ pub struct Args {
     /// Work on so many scenes at a time.
     #[arg(long, default_value_t = 1)]
     threads: usize,
+    /// The rolling map of the tier of 64 KB instead of the odometry alone.
+    #[arg(long)]
+    rolling: bool,
     /// One line a scan: time, pose, truth, sigmas, outcome.
     #[arg(long)]
     trace: bool,
@@ -204,9 +207,13 @@ fn rows(args: &Args, entries: &[Entry], seeds: &[u64]) -> Vec<Row> {
 }
 
 fn one(args: &Args, entry: &Entry, seed: u64) -> Outcome {
+    let runs = match args.rolling {
+        true => Runs::Rolling,
+        false => Runs::Odometry,
+    };
     scene::run(
         entry,
-        seed,
+        (seed, runs),
         |config| config,
         |time, step, truth| {
             if args.trace {

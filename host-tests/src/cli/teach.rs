@@ -197,8 +197,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 /// Largest error of position (m): odometry with wheels, without, SLAM.
 fn largest(scene: &Scene, seed: u64) -> Result<[f64; 3]> {
     let scans = scene.run(seed);
-    let odometry =
-        |scans: &[Revolution]| scene::drive(scene, scans, |it| it, |_, _, _| ()).largest.0;
+    let odometry = |scans: &[Revolution]| {
+        scene::drive(scene, (scans, scene::Runs::Odometry), |it| it, |_, _, _| ())
+            .largest
+            .0
+    };
     let with = odometry(&scans);
     let mapped = slam(scene, &scans)?;
     let blind = scans.into_iter().map(|scan| Revolution {

@@ -1,10 +1,11 @@
 //! How an odometry does in a simulated scene: how far off, refused, and whether it says so.
 
 use beamfix::{
-    geometry::Pose,
+    geometry::{EgoMotion, Pose},
     linalg::Sym3,
-    odometry::{OdometryConfig, Step},
-    scan::Mount,
+    odometry::{Counters, Odometry, OdometryConfig, Step},
+    pipeline::{Estimator, RollingMapper, Tracker},
+    scan::{Mount, Scan},
 };
 use beamfix_sim::{
     Revolution, Scene, TruePose,
@@ -13,7 +14,7 @@ use beamfix_sim::{
 };
 
 use super::hash::PoseHash;
-use crate::{pipeline::Pipeline, size, sized};
+use crate::{pipeline::push_scan, size, sized};
 
 /// A pose farther off than this (m, deg) is wrong ...
 const WRONG: (f64, f64) = (0.05, 1.0);
@@ -93,22 +94,32 @@ impl Outcome {
     }
 }
 
+/// What runs over a scene's scans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Runs {
+    /// The odometry.
+    #[default]
+    Odometry,
+    /// The rolling map of [`Mapper64k`](beamfix::pipeline::Mapper64k), with room for the scene's lidar.
+    Rolling,
+}
+
 /// Runs a scene with one seed; `change` changes the default settings.
 pub fn run(
     entry: &Entry,
-    seed: u64,
+    (seed, runs): (u64, Runs),
     change: impl Fn(OdometryConfig) -> OdometryConfig,
     observe: impl FnMut(f64, &Step, TruePose),
 ) -> Outcome {
     let scene = (entry.make)(seed);
     let scans = scene.run(seed);
-    drive(&scene, &scans, change, observe)
+    drive(&scene, (&scans, runs), change, observe)
 }
 
 /// Runs a scene whose scans are there; `change` changes the default settings.
 pub fn drive(
     scene: &Scene,
-    scans: &[Revolution],
+    (scans, runs): (&[Revolution], Runs),
     change: impl Fn(OdometryConfig) -> OdometryConfig,
     mut observe: impl FnMut(f64, &Step, TruePose),
 ) -> Outcome {
@@ -117,32 +128,76 @@ pub fn drive(
         ..Mount::DEFAULT
     }));
     let size = size::fitting(scans.iter().map(|scan| &scan.beams[..]));
-    sized!(size, follow(scene, scans, config, &mut observe))
+    sized!(size, choose(scene, (scans, runs), config, &mut observe))
 }
 
 /// Follows the robot with room for N beams a revolution.
-fn follow<const N: usize>(
+fn choose<const N: usize>(
     scene: &Scene,
-    scans: &[Revolution],
+    (scans, runs): (&[Revolution], Runs),
     config: OdometryConfig,
     observe: &mut dyn FnMut(f64, &Step, TruePose),
 ) -> Outcome {
-    let mut pipeline = Pipeline::<N>::new(config);
+    let config = OdometryConfig {
+        directions: N as u16,
+        ..config
+    };
+    match runs {
+        Runs::Odometry => {
+            let odometry = Odometry::<N>::new(config);
+            follow(scene, scans, odometry, Odometry::counters, observe)
+        }
+        Runs::Rolling => {
+            let rolling = Rolling::<N>(RollingMapper::new(config));
+            let counters = |rolling: &Rolling<N>| rolling.0.odometry().counters();
+            follow(scene, scans, rolling, counters, observe)
+        }
+    }
+}
+
+/// A rolling map that says its pose and covariance in place of its odometry's.
+struct Rolling<const N: usize>(RollingMapper<N, 36, 180, 512>);
+
+impl<const N: usize> Estimator<N> for Rolling<N> {
+    type Step = Step;
+
+    fn update(&mut self, scan: &Scan<N>, ego: EgoMotion) -> Step {
+        let step = self.0.update(scan, ego);
+        Step {
+            pose: step.pose,
+            covariance: step.covariance,
+            ..step.odometry
+        }
+    }
+}
+
+/// Follows the robot with an estimator.
+fn follow<E: Estimator<N, Step = Step>, const N: usize>(
+    scene: &Scene,
+    scans: &[Revolution],
+    estimator: E,
+    counters: impl Fn(&E) -> Counters,
+    observe: &mut dyn FnMut(f64, &Step, TruePose),
+) -> Outcome {
+    // On the heap: a few scans are too much for a thread's stack in debug builds.
+    let mut tracker = Box::new(Tracker::<E, N>::new(estimator));
     let mut outcome = Outcome::default();
     let mut before = scene.course.truth(0.0);
     let Some(origin) = scans.first().map(|scan| scan.truth) else {
         return outcome;
     };
     for revolution in scans {
-        let step = pipeline.step(&revolution.beams, revolution.wheels.map(Pose::from));
         let truth = origin.between(revolution.truth);
-        outcome.push(revolution.end, &step, truth);
-        observe(revolution.end, &step, truth);
+        let wheels = revolution.wheels.map(Pose::from);
+        push_scan(&mut tracker, &revolution.beams, wheels, |ready| {
+            outcome.push(revolution.end, ready.step, truth);
+            outcome.hash.push(ready.step.pose);
+            observe(revolution.end, ready.step, truth);
+        });
         outcome.driven += before.between(revolution.truth).distance();
         before = revolution.truth;
     }
-    let counters = pipeline.counters();
-    outcome.hash = pipeline.hash;
+    let counters = counters(tracker.estimator());
     (outcome.scans, outcome.refused, outcome.lost) =
         (counters.scans, counters.refused, counters.lost);
     outcome

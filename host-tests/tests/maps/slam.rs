@@ -4,5 +4,7 @@ mod building;
 mod carried;
 mod drive;
 mod nonsense;
+mod recorded;
 mod solver;
+mod standing;
 mod storage;

@@ -57,6 +57,44 @@ fn what_held_holds_and_what_was_mended_stays_so() {
 }
 
 #[test]
+fn a_rolling_map_is_nearer_than_its_odometry_and_as_honest() {
+    let scenes = [
+        "flat",
+        "hall",
+        "wheels-spin",
+        "own-mast",
+        "corridor-person-ahead",
+    ];
+    let mut arguments = vec!["scenes", "--rolling", "--json", "--seeds", "2"];
+    for name in scenes {
+        arguments.extend(["--scene", name]);
+    }
+    let table = json(&beamfix(&arguments));
+    let rows = table["scenes"].as_array().expect("a list");
+    assert_eq!(rows.len(), scenes.len(), "{table}");
+    for row in rows {
+        assert_eq!(row["wrong_and_confident"], 0, "{row}");
+        assert!(row["nees"].as_f64() < Some(3.0), "{row}");
+    }
+    arguments.remove(1);
+    let odometry = json(&beamfix(&arguments));
+    for (rolling, odometry) in rows
+        .iter()
+        .zip(odometry["scenes"].as_array().expect("a list"))
+    {
+        let off = |row: &serde_json::Value| row["max_error_m"].as_f64().expect("metres");
+        // What moves along is left to odometry.
+        let alone = ["flat", "hall", "wheels-spin"]
+            .iter()
+            .any(|name| rolling["scene"] == *name);
+        assert!(
+            !alone || off(rolling) < off(odometry),
+            "{rolling} {odometry}"
+        );
+    }
+}
+
+#[test]
 fn an_unknown_scene_is_a_clear_error() {
     let output = beamfix(&["scenes", "--scene", "moon"]);
     assert_eq!(output.status.code(), Some(2));

@@ -100,12 +100,12 @@ pub enum Mode {
 }
 
 /// Compiled memory configurations, by the RAM of the controller: how many beams a revolution may have.
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
 pub enum Tier {
     /// 360 beams.
     #[value(name = "16k")]
     Small = 360,
-    /// 512 beams.
+    /// 512 beams; with --mode slam a map that rolls with the robot, without loops.
     #[value(name = "64k")]
     Middle = 512,
     /// 720 beams.
@@ -134,9 +134,10 @@ impl Args {
             ),
             _ => {}
         }
+        let keeps_map = self.mode == Mode::Slam && self.tier != Some(Tier::Middle);
         ensure!(
-            self.map_out.is_none() || self.mode == Mode::Slam,
-            "--map-out: the map that was made, with --mode slam"
+            self.map_out.is_none() || keeps_map,
+            "--map-out: the map that was made, with --mode slam; one that rolls with the robot (tier 64k) is not kept"
         );
         ensure!(
             self.start.is_none() || self.mode == Mode::Localize,

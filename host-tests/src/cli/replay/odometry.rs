@@ -1,9 +1,9 @@
-//! `replay --mode odometry`: motion from scan to scan, over a recorded log.
+//! `replay --mode odometry`: motion from scan to scan, over a recorded log; alone, or below a rolling map.
 
 use anyhow::Result;
 use beamfix::geometry::Pose;
 use beamfix::odometry::{Odometry, Refusal, Step};
-use beamfix::pipeline::Estimator;
+use beamfix::pipeline::{Estimate as _, Estimator, Mapper64k};
 use host_tests::formats::Log;
 use host_tests::pipeline::{Followed, config, follow, sparse_odometry};
 use host_tests::{size, sized};
@@ -23,15 +23,36 @@ pub fn run(args: &Args, log: &Log, (size, directions): (usize, usize)) -> Result
                 width.to_degrees()
             )]);
             let odometry = sparse_odometry(args.mount_of(log), width);
-            replay(args, log, odometry, |_| 0)
+            replay(args, log, (odometry, "odometry"), step, |_| 0)
         }
         None => sized!(size, turning(args, log, directions)),
     }?;
-    let Counted {
+    report(args, log, size, &outcome)
+}
+
+/// Replays the log through the rolling map of the tier of 64 KB, with so many directions, and reports.
+pub fn run_rolling(args: &Args, log: &Log, directions: usize) -> Result<Done> {
+    let mapper = Mapper64k::new(config(args.mount_of(log), directions));
+    let outcome = replay::<_, 512>(
+        args,
+        log,
+        (mapper, "rolling map"),
+        |step| &step.odometry,
+        |mapper| mapper.odometry().counters().lost,
+    )?;
+    report(args, log, 512, &outcome)
+}
+
+fn step(step: &Step) -> &Step {
+    step
+}
+
+fn report(args: &Args, log: &Log, size: usize, outcome: &Followed<Counted>) -> Result<Done> {
+    let &Counted {
         keyframes,
         lost,
         measured,
-    } = outcome.estimator;
+    } = &outcome.estimator;
     let scans = outcome.scans;
     // A scan before the first reference has no pose of its own either.
     let refused = scans - measured;
@@ -73,14 +94,16 @@ struct Counted {
 /// A lidar that turns, with room for N beams a revolution and so many directions.
 fn turning<const N: usize>(args: &Args, log: &Log, directions: usize) -> Result<Followed<Counted>> {
     let odometry = Odometry::<N>::new(config(args.mount_of(log), directions));
-    replay(args, log, odometry, |odometry| odometry.counters().lost)
+    let lost = |odometry: &Odometry<N>| odometry.counters().lost;
+    replay(args, log, (odometry, "odometry"), step, lost)
 }
 
-/// Replays with an estimator; `lost` counts the keyframes that it has given up.
-fn replay<E: Estimator<N, Step = Step>, const N: usize>(
+/// Replays with an estimator of this name; `of` is what its odometry says, `lost` counts the keyframes that it has given up.
+fn replay<E: Estimator<N>, const N: usize>(
     args: &Args,
     log: &Log,
-    estimator: E,
+    (estimator, name): (E, &str),
+    of: impl Fn(&E::Step) -> &Step,
     lost: impl Fn(&E) -> u32,
 ) -> Result<Followed<Counted>> {
     let mut trajectory = args.open_trajectory()?;
@@ -90,7 +113,8 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
     let is_turning = size::beam_width(log.scans.iter().map(|scan| &scan.beams[..])).is_none();
     let mut leave = args.leave(log, is_turning)?;
     let ego = (count, args.uses_wheels());
-    let followed = follow(log, ego, estimator, &mut |scan, pose, step| {
+    let followed = follow(log, ego, estimator, &mut |scan, pose, told| {
+        let step = of(told);
         let is_first = step.keyframe && step.outcome == Err(Refusal::First);
         let is_measured = step.outcome.is_ok() || is_first;
         measured += usize::from(is_measured);
@@ -98,13 +122,13 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
         if let Some(file) = &mut trajectory {
             file.push(&scan.stamp, pose, !is_measured)?;
         }
-        leave.push(scan, pose, Some(step.covariance), is_measured)?;
+        leave.push(scan, pose, told.covariance(), is_measured)?;
         bar.inc(1);
         Ok(())
     })?;
     bar.finish_and_clear();
     let caption = format!("{count} scans, pose hash {}", followed.hash);
-    let title = format!("beamfix: odometry over {}", args.name());
+    let title = format!("beamfix: {name} over {}", args.name());
     leave.finish(args, (title, caption), None)?;
     if let Some(file) = trajectory {
         file.finish()?;

@@ -22,7 +22,7 @@ pub fn run(args: &Args, log: &Log, directions: usize) -> Result<Done> {
         Some(Tier::Large) => mapping::Tier::Of192k,
         Some(Tier::Huge) | None => mapping::Tier::Of512k,
         Some(Tier::Small | Tier::Middle) => {
-            bail!("--tier: slam needs the memory of 192k or 512k")
+            bail!("--tier: slam needs the memory of 192k or 512k, a rolling map that of 64k")
         }
     };
     let mut trajectory = args.open_trajectory()?;
@@ -78,6 +78,7 @@ pub fn run(args: &Args, log: &Log, directions: usize) -> Result<Done> {
     let refused = scans - measured;
     let last = map.scans.last().map_or(Pose::IDENTITY, |scan| scan.pose);
     let beams = match tier {
+        mapping::Tier::Of64k => 512,
         mapping::Tier::Of192k => 720,
         mapping::Tier::Of512k => 1024,
     };

@@ -1,7 +1,7 @@
 //! Simulated buildings: a loop closed, a full memory, two rooms that look alike.
 
 use beamfix::{
-    pipeline::{Mapper192k, Mapper512k, Tracker},
+    pipeline::{Mapper64k, Mapper192k, Mapper512k, Tracker},
     slam::{Slam, Slam192k, SlamConfig},
 };
 
@@ -63,6 +63,7 @@ fn tiers_leave_room_for_the_stack() {
     // The deepest stack measured is 8.5 KB: `beamfix card --tier 192k` proves it on a core with just that RAM.
     const STACK: usize = 10 << 10;
     for (name, bytes, there_are) in [
+        ("64k", size_of::<Tracker<Mapper64k, 512>>(), 64 << 10),
         ("192k", size_of::<Tracker<Mapper192k, 720>>(), 192 << 10),
         ("512k", size_of::<Tracker<Mapper512k, 1024>>(), 512 << 10),
     ] {
