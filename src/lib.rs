@@ -36,6 +36,7 @@
 //! | `defmt` | `defmt::Format` on the public types |
 //! | `modular` | ICP with every stage a choice, for study: what the fast one does, step by step |
 //! | `slam` | maps as estimators of the pipeline: `Mapper64k`, which rolls with the robot, and `Mapper192k` and `Mapper512k`, which close loops |
+//! | `particles` | localization in a map by particles |
 //! | `internals` | the workings, for this project's own tests; nothing in it is stable |
 #![no_std]
 #![forbid(unsafe_code)]

@@ -3,7 +3,7 @@
 mod sym3;
 
 use crate::{geometry::Pose, math};
-pub use sym3::Sym3;
+pub use sym3::{Root, Sym3};
 
 /// What a match knows about a pose: the inverse of a [`Covariance`] (1/m², 1/(m·rad), 1/rad²).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -110,6 +110,27 @@ mod tests {
                 assert!((value - expected).abs() < 1e-6, "{i} {k}: {value}");
             }
         }
+    }
+
+    #[test]
+    fn a_root_times_its_transpose_is_the_matrix() {
+        let root = M.root().expect("positive definite");
+        let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|e| root.times(e));
+        let back = columns
+            .map(Sym3::outer)
+            .iter()
+            .fold(Sym3::default(), |sum, outer| sum.plus(outer));
+        for (a, b) in Covariance(back)
+            .to_array()
+            .into_iter()
+            .zip(Covariance(M).to_array())
+        {
+            assert!((a - b).abs() < 1e-5, "{back:?}");
+        }
+        let inverse = M.inverse().and_then(|inverse| inverse.root());
+        let product = root.determinant() * inverse.expect("so is its inverse").determinant();
+        assert!((product - 1.0).abs() < 1e-5, "{product}");
+        assert_eq!(Sym3::diagonal(1.0, 0.0, 1.0).root(), None);
     }
 
     #[test]

@@ -16,6 +16,8 @@ mod config;
 pub(crate) mod hypotheses;
 #[cfg(feature = "internals")]
 pub mod hypotheses;
+#[cfg(feature = "particles")]
+pub mod particles;
 pub mod presence;
 #[cfg(not(feature = "internals"))]
 pub(crate) mod quality;
@@ -33,7 +35,6 @@ use crate::{
         correlative::{CorrelativeConfig, Correlator, pyramid::Pyramid},
         field,
     },
-    math,
     scan::{ScanPoint, thinning::thinned},
 };
 pub use config::LocalizerConfig;
@@ -269,13 +270,10 @@ impl<'a, const N: usize> Localizer<'a, N> {
         Verdict::Doubtful(best.map_or(Quality::NONE, |(_, quality)| quality))
     }
 
-    /// Whether a scan that fits leaves no doubts. The fewer beams agree, because people end the others, the fewer may have
-    /// crossed a wall.
+    /// Whether a scan that fits leaves no doubts.
     fn is_sure(&self, quality: &Quality) -> bool {
-        let value = quality.value();
-        let agreeing = math::min(2.0 * value, 1.0);
-        value >= self.config.confident_quality
-            && quality.through_share() <= self.config.max_wall_crossings * agreeing * agreeing
+        quality.value() >= self.config.confident_quality
+            && quality.is_confident(self.config.max_wall_crossings)
     }
 
     fn update_lost(&mut self, points: &[ScanPoint]) -> Verdict {

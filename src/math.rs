@@ -18,6 +18,7 @@
 //! | [`rough_length`] | magnitudes to 2²⁸ | 3 % | about 12 |
 //! | [`isqrt`] | all `u32` | exact floor | about 120 |
 
+pub mod random;
 pub mod reciprocal;
 pub mod turn;
 

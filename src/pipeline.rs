@@ -23,8 +23,11 @@ mod gyro;
 mod map_localizer;
 #[cfg(feature = "slam")]
 mod mapper;
+#[cfg(feature = "particles")]
+mod particle_localizer;
 #[cfg(feature = "slam")]
 mod rolling;
+mod seen;
 mod tracker;
 mod wheels;
 
@@ -32,6 +35,8 @@ pub use estimator::{Estimate, Estimator, Verdict};
 pub use map_localizer::{Located, MapLocalizer};
 #[cfg(feature = "slam")]
 pub use mapper::{Mapped, Mapper, Mapper192k, Mapper512k};
+#[cfg(feature = "particles")]
+pub use particle_localizer::ParticleLocalizer;
 #[cfg(feature = "slam")]
 pub use rolling::{Mapper64k, RollingMapper, RollingStep};
 pub use tracker::{Revolution, Tracker};

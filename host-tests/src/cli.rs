@@ -9,6 +9,7 @@ mod lidars;
 mod live;
 mod output;
 mod pairs;
+mod particles;
 mod prior;
 mod prune;
 mod regress;
@@ -44,6 +45,7 @@ enum Command {
     Regress(regress::Args),
     Replay(replay::Args),
     Pairs(pairs::Args),
+    Particles(particles::Args),
     Decode(decode::Args),
     Field(field::Args),
     Learn(learn::Args),
@@ -75,6 +77,7 @@ pub fn run() -> ExitCode {
         Some(Command::Regress(args)) => regress::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Pairs(args)) => pairs::run(&args),
+        Some(Command::Particles(args)) => particles::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Card(args)) => card::run(&args),
         Some(Command::Prune(args)) => prune::run(&args),

@@ -12,6 +12,8 @@ pub mod golden;
 pub mod learn;
 pub mod mapping;
 pub mod matcher;
+#[cfg(not(target_family = "wasm"))]
+pub mod particles;
 pub mod pipeline;
 #[cfg(not(target_family = "wasm"))]
 pub mod regress;

@@ -27,6 +27,21 @@ impl EgoMotion {
         rotation: None,
     };
 
+    /// Standard deviation of an unknown velocity (m/s): robots drive at half a walking pace to a walking pace.
+    pub(crate) const WALKING: f32 = 0.8;
+    /// Standard deviation of an unknown rate of turn (rad/s): a robot turns round in four seconds.
+    pub(crate) const TURNING: f32 = 1.5;
+
+    /// Assumed standard deviations (m, rad) of a motion by wheels: a share of its distance and its rotation.
+    pub(crate) fn wheel_errors(share: f32, motion: Pose) -> (f32, f32) {
+        /// Error of a standstill (m, rad).
+        const MIN_ERROR: f32 = 0.001;
+        (
+            share * motion.distance() + MIN_ERROR,
+            share * math::abs(motion.theta) + MIN_ERROR,
+        )
+    }
+
     /// Motion by the wheels, with the gyroscope's rotation where there is one: on carpet and over sills wheels tell the
     /// distance well and the heading badly. Nothing where the wheels tell 32 m or 32 rad or more, or no number.
     #[must_use]

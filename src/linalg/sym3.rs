@@ -167,6 +167,20 @@ impl Sym3 {
         Some(self.cholesky()?.solve(b))
     }
 
+    /// A matrix whose product with its transpose is this one: it makes numbers of this covariance from independent ones of
+    /// variance 1. `None` unless this one is positive definite.
+    #[must_use]
+    pub fn root(&self) -> Option<Root> {
+        let Ldl { d, l10, l20, l21 } = self.cholesky()?;
+        let [a, b, c] = d.map(math::sqrt);
+        Some(Root {
+            diagonal: [a, b, c],
+            yx: l10 * a,
+            tx: l20 * a,
+            ty: l21 * b,
+        })
+    }
+
     /// `M = L D Lᵀ`; `None` where a pivot is not clearly positive.
     fn cholesky(&self) -> Option<Ldl> {
         /// A pivot this much smaller than its diagonal entry is only rounding.
@@ -216,6 +230,35 @@ impl Sym3 {
             }
         }
         pairs
+    }
+}
+
+/// A lower triangle, rows and columns `(x, y, θ)`: a root of a [`Sym3`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Root {
+    diagonal: [f32; 3],
+    yx: f32,
+    tx: f32,
+    ty: f32,
+}
+
+impl Root {
+    /// Matrix times vector.
+    #[must_use]
+    pub fn times(&self, [x, y, t]: [f32; 3]) -> [f32; 3] {
+        let [xx, yy, tt] = self.diagonal;
+        [
+            xx * x,
+            self.yx * x + yy * y,
+            self.tx * x + self.ty * y + tt * t,
+        ]
+    }
+
+    /// Its determinant: the volume that the unit cube becomes.
+    #[must_use]
+    pub fn determinant(&self) -> f32 {
+        let [xx, yy, tt] = self.diagonal;
+        xx * yy * tt
     }
 }
 

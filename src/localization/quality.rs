@@ -2,6 +2,7 @@
 
 use crate::{
     geometry::Pose,
+    math,
     scan::{ScanPoint, thinning::thinned},
     sensor_model::likelihood_field::{Field, placement::Placement},
 };
@@ -98,6 +99,13 @@ impl Quality {
     #[must_use]
     pub fn strict_value(&self) -> f32 {
         self.share_of(self.beams)
+    }
+
+    /// Whether few beams passed a surface, `most` a share of those that nothing ended early. The fewer beams agree, because
+    /// people end the others, the fewer may have.
+    pub(crate) fn is_confident(&self, most: f32) -> bool {
+        let agreeing = math::min(2.0 * self.value(), 1.0);
+        self.through_share() <= most * agreeing * agreeing
     }
 
     fn share_of(&self, beams: u16) -> f32 {

@@ -4,7 +4,7 @@ use core::f32::consts::FRAC_1_PI;
 
 use super::motion::Source;
 use crate::{
-    geometry::{Pose, Twist},
+    geometry::{EgoMotion, Pose, Twist},
     linalg::{Covariance, Sym3},
     math,
 };
@@ -12,10 +12,6 @@ use crate::{
 /// Standard deviation of a robot's unforeseen acceleration (m/s², rad/s²): an ordinary robot brakes and turns in within
 /// twice of these.
 const ACCELERATION: (f32, f32) = (3.0, 4.0);
-/// Standard deviation of an unknown rate of turn (rad/s): a robot turns round in four seconds.
-const TURNING: f32 = 1.5;
-/// Standard deviation of an unknown velocity (m/s): robots drive at half a walking pace to a walking pace.
-pub(super) const WALKING: f32 = 0.8;
 /// Standard deviation of a heading of which nothing is known (rad): π/√3.
 pub(super) const ANY_HEADING: f32 = 1.8;
 
@@ -26,7 +22,7 @@ pub(super) const FLOOR: Sym3 = Sym3::diagonal(1e-8, 1e-8, 1e-8);
 /// that long, up to what an unknown velocity would do (m², rad²).
 fn coasting(seconds: f32) -> (f32, f32) {
     let half = 0.5 * seconds * seconds;
-    let distance = math::min(ACCELERATION.0 * half, 2.0 * WALKING * seconds);
+    let distance = math::min(ACCELERATION.0 * half, 2.0 * EgoMotion::WALKING * seconds);
     let rotation = math::min(ACCELERATION.1 * half, ANY_HEADING);
     (distance * distance, rotation * rotation)
 }
@@ -39,7 +35,7 @@ pub(super) fn coasting_between(before: f32, after: f32) -> Covariance {
 
 /// Standard deviation of a rate of turn (rad/s) that was measured `seconds` ago.
 pub(super) fn turn_rate_after(seconds: f32) -> f32 {
-    math::min(ACCELERATION.1 * seconds, TURNING)
+    math::min(ACCELERATION.1 * seconds, EgoMotion::TURNING)
 }
 
 /// Covariance of the pose at a scan's end for what a match cannot see: the robot may have begun to accelerate since the
@@ -138,16 +134,6 @@ impl Ratio {
     }
 }
 
-/// Assumed standard deviations (m, rad) of a motion by wheels: a share of its distance and its rotation.
-fn assumed(share: f32, motion: Pose) -> (f32, f32) {
-    /// Error of a standstill (m, rad).
-    const MIN_ERROR: f32 = 0.001;
-    (
-        share * motion.distance() + MIN_ERROR,
-        share * math::abs(motion.theta) + MIN_ERROR,
-    )
-}
-
 impl WheelErrors {
     pub const fn new() -> Self {
         Self {
@@ -161,7 +147,7 @@ impl WheelErrors {
 
     /// Covariance of a motion by wheels whose errors are assumed to be `share` of it.
     pub fn covariance(&self, share: f32, motion: Pose) -> Covariance {
-        let (distance, rotation) = assumed(share, motion);
+        let (distance, rotation) = EgoMotion::wheel_errors(share, motion);
         let distance = distance * distance * self.translation.factor();
         Covariance(Sym3::diagonal(
             distance,
@@ -212,7 +198,7 @@ impl WheelErrors {
         let (Some([x, y, t]), Some([lx, ly, lt])) = (change, last) else {
             return;
         };
-        let (distance, rotation) = assumed(share, motion);
+        let (distance, rotation) = EgoMotion::wheel_errors(share, motion);
         let noise = &of_match.0;
         let square = x * x + y * y;
         self.translation.push(

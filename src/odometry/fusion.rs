@@ -1,13 +1,12 @@
 //! Where the robot is by its match and its prior, each weighed by its covariance.
 
 use super::{
-    error_model::WALKING,
     motion::{Source, Times},
     prior::Prior,
     state::Odometry,
 };
 use crate::{
-    geometry::Pose,
+    geometry::{EgoMotion, Pose},
     linalg::{Covariance, Sym3},
     matching::Match,
     math,
@@ -126,7 +125,7 @@ impl<const N: usize> Odometry<N> {
                     let straight = math::abs(math::wrap_angle(measured.theta - since.theta)) < 0.2;
                     let stands = math::abs(moved + along) < STANDING * tracking.seconds;
                     if share < COMPANION_ALONE && stands && straight {
-                        let walked = WALKING * tracking.seconds;
+                        let walked = EgoMotion::WALKING * tracking.seconds;
                         doubt = [ux * walked, uy * walked, 0.0];
                     }
                 }

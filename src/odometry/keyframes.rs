@@ -1,12 +1,8 @@
 //! When a scan becomes the keyframe, and what is counted.
 
-use super::{
-    error_model::{ANY_HEADING, WALKING},
-    state::Odometry,
-    step::Refusal,
-    tracking::Tracking,
-};
+use super::{error_model::ANY_HEADING, state::Odometry, step::Refusal, tracking::Tracking};
 use crate::{
+    geometry::EgoMotion,
     linalg::{Covariance, Sym3},
     matching::{Match, icp},
     math,
@@ -100,7 +96,7 @@ impl<const N: usize> Odometry<N> {
         if self.keyframe.pose.between(self.pose).distance() > IN_SIGHT {
             return self.covariance;
         }
-        let carried = 2.0 * WALKING * self.tracking.blind;
+        let carried = 2.0 * EgoMotion::WALKING * self.tracking.blind;
         let (distance, rotation) = (carried * carried, ANY_HEADING * ANY_HEADING);
         self.covariance
             .plus(&Covariance(Sym3::diagonal(distance, distance, rotation)))

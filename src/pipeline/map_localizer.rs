@@ -1,11 +1,14 @@
 //! Localization in a map as an estimator: whole scans and the robot's motion in, the robot's pose out.
 
-use super::estimator::{Estimate, Estimator, Verdict};
+use super::{
+    estimator::{Estimate, Estimator, Verdict},
+    seen::Seen,
+};
 use crate::{
-    geometry::{EgoMotion, Pose, Twist},
+    geometry::{EgoMotion, Pose},
     linalg::Covariance,
     localization::{Localizer, Verdict as Localization},
-    scan::{Points, PointsConfig, Scan},
+    scan::{PointsConfig, Scan},
 };
 
 /// A [`Localizer`] with the lidar's place on the robot.
@@ -15,9 +18,7 @@ use crate::{
 #[derive(Debug)]
 pub struct MapLocalizer<'a, const N: usize, const M: usize> {
     localizer: Localizer<'a, M>,
-    config: PointsConfig,
-    points: Points<N>,
-    end_us: u32,
+    seen: Seen<N>,
 }
 
 /// What is known of the robot in a map after a scan.
@@ -38,22 +39,20 @@ impl<'a, const N: usize, const M: usize> MapLocalizer<'a, N, M> {
     pub const fn new(localizer: Localizer<'a, M>, config: PointsConfig) -> Self {
         Self {
             localizer,
-            config,
-            points: Points::new(),
-            end_us: 0,
+            seen: Seen::new(config),
         }
     }
 
     /// Tracks from a known pose of the robot in the map on (m, rad).
     pub fn start_at(&mut self, map_from_robot: Pose) {
-        let mount = self.config.mount.robot_from_lidar;
+        let mount = self.seen.mount().robot_from_lidar;
         self.localizer.start_at(map_from_robot * mount);
     }
 
     /// Robot in the map (m, rad), where it is known.
     #[must_use]
     pub fn pose(&self) -> Option<Pose> {
-        let mount = self.config.mount.robot_from_lidar;
+        let mount = self.seen.mount().robot_from_lidar;
         Some(self.localizer.pose()? * mount.inverse())
     }
 
@@ -68,22 +67,9 @@ impl<const N: usize, const M: usize> Estimator<N> for MapLocalizer<'_, N, M> {
     type Step = Located;
 
     fn update(&mut self, scan: &Scan<N>, ego: EgoMotion) -> Located {
-        let motion = ego.motion().unwrap_or(Pose {
-            theta: ego.credible_rotation().unwrap_or(0.0),
-            ..Pose::IDENTITY
-        });
-        // After a pause longer than any revolution, or for the first scan, the motion is taken to be the scan's own.
-        let micros = scan.end_us().wrapping_sub(self.end_us);
-        self.end_us = scan.end_us();
-        let seconds = if micros < 2_000_000 {
-            micros as f32 * 1e-6
-        } else {
-            scan.duration()
-        };
-        let twist = Twist::from_motion(motion, seconds);
-        self.points.assign(scan, twist, &self.config);
-        let lidar_motion = self.config.mount.lidar_motion(motion);
-        let outcome = self.localizer.update(self.points.as_slice(), lidar_motion);
+        let (motion, _) = self.seen.take(scan, ego);
+        let lidar_motion = self.seen.mount().lidar_motion(motion);
+        let outcome = self.localizer.update(self.seen.points(), lidar_motion);
         let pose = self.pose();
         let covariance = match (&outcome, pose, self.localizer.pose()) {
             // The match is about the lidar: its error of heading moves the robot's centre about it.

@@ -144,6 +144,8 @@ pub struct BeamTable {
     anything: u32,
     none: i32,
     range_max_mm: u16,
+    /// Spread of hits (m).
+    sigma: f32,
 }
 
 impl BeamTable {
@@ -187,9 +189,20 @@ impl BeamTable {
             anything: one(model.z_rand / model.range_max).max(1),
             none: 0,
             range_max_mm,
+            sigma: model.sigma,
         };
         table.none = table.log_q8(one(model.z_max));
         table
+    }
+
+    /// Spread of hits (m).
+    pub(crate) const fn sigma(&self) -> f32 {
+        self.sigma
+    }
+
+    /// Longest range (mm).
+    pub(crate) const fn range_max_mm(&self) -> u16 {
+        self.range_max_mm
     }
 
     /// Log-likelihood of a range (mm; `None`: no return) where the map says `expected_mm`: 256ths of a nat.

@@ -7,7 +7,11 @@ use core::hint::black_box;
 use beamfix::{
     geometry::{Point, Pose},
     grid::{Grid, Shape, cast, distance, occupancy},
-    localization::{Localizer, LocalizerConfig, presence},
+    localization::{
+        Localizer, LocalizerConfig,
+        particles::{Motion, ParticleConfig, ParticleFilter, Weighting},
+        presence,
+    },
     matching::{
         correlative::{Correlator, pyramid::Pyramid},
         field, map,
@@ -83,6 +87,7 @@ impl Maps {
         robot.update(points, pose);
         while !robot.step(1000) {}
         sum += robot.pose().map_or(0.0, |pose| pose.x);
+        sum += particles(stored, points, pose);
         let faces = [Point::new(pose.x, pose.y); 3];
         let found = presence::find(
             &mut self.correlator,
@@ -118,6 +123,23 @@ impl Maps {
         let hits = f32::from(u8::from(hit.is_some()));
         Some(hits + found.map_or(0.0, |found| found.correlation.common))
     }
+}
+
+/// A particle filter that is told a pose, and one that is not, weighed by either sensor model.
+fn particles(field: LikelihoodField<&[u8]>, points: &[ScanPoint], pose: Pose) -> f32 {
+    let table = BeamTable::new(&BeamModel::DEFAULT);
+    let mut sum = 0.0;
+    for weighting in [Weighting::LikelihoodField, Weighting::BeamModel(&table)] {
+        let filter = ParticleFilter::<8, POINTS>::new(field, ParticleConfig::DEFAULT);
+        let mut filter = filter.weighed_by(weighting);
+        sum += filter.update(points).fit;
+        filter.start_at(pose, (pose.x, pose.y));
+        filter.moved(&Motion::by_wheels(pose, pose.x));
+        filter.moved(&Motion::unknown(pose.y));
+        sum += filter.update(points).pose.x;
+        sum += filter.particles().map(|(_, weight)| weight).sum::<f32>();
+    }
+    sum
 }
 
 /// The beam model and its learning.

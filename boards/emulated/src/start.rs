@@ -5,16 +5,21 @@
 //! for each `u16` bearing (1/65536 turn), `u16` range (mm).
 //! `output.bin`, `u32` each: for every scan, up to the first after which the pose is known, whether it is, the pose as three
 //! `f32`, the instructions of `update`, the calls of `step`, the instructions of the longest and of all. At the end the
-//! bytes looked up, the bytes of the localizer and of the pyramid, the peak stack (bytes).
+//! bytes looked up, the bytes of the localizer and of the pyramid, the peak stack (bytes); then of a particle filter that
+//! starts at the found pose with the last scan, by the proposal from the motion and by the improved one, the instructions
+//! and the pose as three `f32`; and its bytes.
 
 use core::mem::size_of;
 
 use beamfix::{
     geometry::Pose,
-    localization::{Localizer, LocalizerConfig},
+    localization::{
+        Localizer, LocalizerConfig,
+        particles::{Motion, ParticleConfig, ParticleFilter, Proposal},
+    },
     matching::correlative::pyramid::Pyramid,
     scan::{Bearing, ScanPoint},
-    sensor_model::likelihood_field::{Field as _, stored},
+    sensor_model::likelihood_field::{Field as _, LikelihoodField, stored},
 };
 use semihosting::{
     fs::File,
@@ -27,6 +32,8 @@ use crate::{INPUT, Machine, OUTPUT, bench::pose_from, read_full, stack::Stack};
 pub const FIELD: usize = stored::HEADER + 400 * 320;
 /// Points of a scan that the localizer keeps.
 pub const POINTS: usize = 96;
+/// Particles.
+pub const PARTICLES: usize = 16;
 /// Most beams of a scan.
 pub const BEAMS: usize = 450;
 /// Most bytes of the pyramid.
@@ -99,8 +106,37 @@ impl Start {
             size_of::<Localizer<'static, POINTS>>() as u32,
             pyramid_bytes as u32,
             stack.peak(),
-        ])
+        ])?;
+        let pose = robot.pose().unwrap_or(Pose::IDENTITY);
+        for proposal in [Proposal::Motion, Proposal::Improved] {
+            out(&weighed(machine, field, &self.points, pose, proposal))?;
+        }
+        out(&[size_of::<ParticleFilter<'static, PARTICLES, POINTS>>() as u32])
     }
+}
+
+/// Instructions of a scan that particles around a pose are weighed with, and their mean. On its own: its memory is not part
+/// of the search's stack.
+#[inline(never)]
+fn weighed(
+    machine: &mut impl Machine,
+    field: LikelihoodField<&[u8]>,
+    points: &[ScanPoint],
+    pose: Pose,
+    proposal: Proposal,
+) -> [u32; 4] {
+    let config = ParticleConfig {
+        proposal,
+        ..ParticleConfig::DEFAULT
+    };
+    let mut filter = ParticleFilter::<PARTICLES, POINTS>::new(field, config);
+    filter.start_at(pose, (0.05, 0.05));
+    filter.moved(&Motion::by_wheels(Pose::new(0.0, 0.0, 0.05), 0.2));
+    machine.restart();
+    let belief = filter.update(points);
+    let instructions = machine.instructions();
+    let [x, y, theta] = [belief.pose.x, belief.pose.y, belief.pose.theta].map(f32::to_bits);
+    [instructions, x, y, theta]
 }
 
 fn read_word(input: &mut File) -> io::Result<u32> {

@@ -62,6 +62,14 @@ impl Card {
                 costs.field_bytes,
                 costs.ram_bytes
             );
+            text += &format!(
+                "\n{}: 16 particles, a scan that they are weighed with: {:.2} M instructions drawn from the wheels, {:.2} M from wheels \
+                 and match; filter {} B of RAM",
+                costs.board,
+                f64::from(costs.by_motion) / 1e6,
+                f64::from(costs.improved) / 1e6,
+                costs.filter_bytes
+            );
         }
         text
     }
@@ -90,6 +98,9 @@ impl Card {
                     ("field", costs.field_bytes),
                     ("localizer", costs.ram_bytes),
                     ("stack of a start", costs.stack_bytes),
+                    ("particles by motion", costs.by_motion),
+                    ("particles by match", costs.improved),
+                    ("particle filter", costs.filter_bytes),
                 ]
                 .map(|(what, value)| (format!("{}: {what}", costs.board), value.into())),
             );

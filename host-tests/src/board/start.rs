@@ -3,7 +3,10 @@
 use anyhow::{Context as _, Result, ensure};
 use beamfix::{
     geometry::Pose,
-    localization::{Localizer, LocalizerConfig},
+    localization::{
+        Localizer, LocalizerConfig,
+        particles::{Motion, ParticleConfig, ParticleFilter, Proposal},
+    },
     matching::correlative::pyramid::Pyramid,
     scan::ScanPoint,
     sensor_model::likelihood_field::{Field as _, FieldModel, LikelihoodField, Profile, stored},
@@ -22,6 +25,7 @@ const BUDGET: u32 = 500_000;
 /// As the board's program has it: `boards/emulated/src/start.rs`.
 const POINTS: usize = 96;
 const BEAMS: usize = 450;
+const PARTICLES: usize = 16;
 /// Scans that there are.
 const SCANS: usize = 5;
 
@@ -46,6 +50,12 @@ pub struct StartCosts {
     pub step_budget: u32,
     /// Bytes looked up in all.
     pub lookups: u32,
+    /// Instructions of a scan that 16 particles are weighed with, drawn from the motion.
+    pub by_motion: u32,
+    /// The same, drawn from motion and match.
+    pub improved: u32,
+    /// Bytes of the particle filter.
+    pub filter_bytes: u32,
 }
 
 /// The home's field, and scans of a robot that turns on the spot.
@@ -97,8 +107,22 @@ pub fn measure(board: &Board) -> Result<StartCosts> {
         .chunks_exact(4)
         .map(|word| u32::from_le_bytes(word.try_into().expect("four bytes")))
         .collect();
-    let (scans, rest) = words.as_chunks::<8>();
-    let [lookups, localizer, pyramid, stack_bytes] = *rest else {
+    let (scans, last) = words.as_chunks::<8>();
+    // Eight words a scan, and 13 at the end.
+    let Some((rest, scans)) = scans.split_last() else {
+        anyhow::bail!("{}: {} words came back", board.name, words.len());
+    };
+    let [
+        lookups,
+        localizer,
+        pyramid,
+        stack_bytes,
+        by_motion,
+        mx,
+        my,
+        mt,
+    ] = *rest;
+    let [improved, ix, iy, it, filter_bytes] = *last else {
         anyhow::bail!("{}: {} words came back", board.name, words.len());
     };
     let Some(&[known, x, y, theta, ..]) = scans.last() else {
@@ -111,6 +135,12 @@ pub fn measure(board: &Board) -> Result<StartCosts> {
         "{}: {:?} is not what the host finds: {here:?}",
         board.name,
         [x, y, theta].map(f32::from_bits)
+    );
+    let particles = particles(&scene, here, scans.len());
+    ensure!(
+        [[mx, my, mt], [ix, iy, it]] == particles,
+        "{}: the particles are not the host's",
+        board.name
     );
     let off = scene.truth[scans.len() - 1].between(here.into());
     ensure!(
@@ -128,6 +158,9 @@ pub fn measure(board: &Board) -> Result<StartCosts> {
         step_instructions: scans.iter().map(|scan| scan[6]).max().unwrap_or(0),
         step_budget: BUDGET,
         lookups,
+        by_motion,
+        improved,
+        filter_bytes,
     })
 }
 
@@ -144,6 +177,21 @@ fn on_host(scene: &Scene) -> Result<Pose> {
         }
     }
     None.context("the pose was not found, here")
+}
+
+/// The poses by particles that start at a pose with the last one of so many scans, as the board's program has it.
+fn particles(scene: &Scene, pose: Pose, scans: usize) -> [[u32; 3]; 2] {
+    [Proposal::Motion, Proposal::Improved].map(|proposal| {
+        let config = ParticleConfig {
+            proposal,
+            ..ParticleConfig::DEFAULT
+        };
+        let mut filter = ParticleFilter::<PARTICLES, POINTS>::new(scene.field.as_slice(), config);
+        filter.start_at(pose, (0.05, 0.05));
+        filter.moved(&Motion::by_wheels(Pose::new(0.0, 0.0, 0.05), 0.2));
+        let belief = filter.update(&scene.scans[scans - 1].1);
+        [belief.pose.x, belief.pose.y, belief.pose.theta].map(f32::to_bits)
+    })
 }
 
 fn input(scene: &Scene) -> Vec<u8> {

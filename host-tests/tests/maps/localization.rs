@@ -14,14 +14,14 @@ use host_tests::formats::ros_map::{self, Map};
 const BEAMS: usize = 450;
 type Robot<'a> = Localizer<'a, 96>;
 
-struct Place {
-    world: World,
-    map: Map,
-    field: LikelihoodField<Vec<u8>>,
+pub struct Place {
+    pub world: World,
+    pub map: Map,
+    pub field: LikelihoodField<Vec<u8>>,
 }
 
 /// The home, its map at 5 cm, and the field made from the map as for flash.
-fn place() -> Place {
+pub fn place() -> Place {
     let world = home::home();
     let (low, high) = home::EXTENT;
     let map = ros_map::of_world(&world, low, high, 0.05, home::INSIDE).expect("a map");
@@ -33,12 +33,12 @@ fn place() -> Place {
     Place { world, map, field }
 }
 
-fn scan(world: &World, pose: TruePose, noise: &mut Noise) -> Vec<ScanPoint> {
+pub fn scan(world: &World, pose: TruePose, noise: &mut Noise) -> Vec<ScanPoint> {
     points_of(&Still::full_turn(BEAMS).scan(world, pose, noise))
 }
 
 /// One move of the robot, up to 0.3 m and 0.5 rad, where there is room; and what the wheels say of it.
-fn drive(place: &Place, pose: TruePose, noise: &mut Noise) -> (TruePose, Pose) {
+pub fn drive(place: &Place, pose: TruePose, noise: &mut Noise) -> (TruePose, Pose) {
     let motion = TruePose::new(noise.even(0.0, 0.3), 0.0, noise.even(-0.5, 0.5));
     let next = pose.then(motion);
     let room = place.world.clearance([next.x, next.y]) > 0.2 && home::on_floor(&place.map, next);

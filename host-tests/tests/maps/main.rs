@@ -6,5 +6,6 @@ mod common;
 mod fields;
 mod grid;
 mod localization;
+mod particles;
 mod presence;
 mod slam;

@@ -45,7 +45,7 @@ impl Select for EveryNth {
 
 /// A random share, another at each match: where a regular pattern would fall in step with the scene.
 ///
-/// Marsaglia's xorshift (J. Stat. Softw. 8, 2003) with shifts 13, 17, 5; the same seed gives the same points everywhere.
+/// Marsaglia's xorshift; the same seed gives the same points everywhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Random {
     /// Points of 256 that are taken. Default 64.
@@ -62,12 +62,8 @@ impl Default for Random {
 
 impl Random {
     fn next(&mut self) -> u32 {
-        let mut x = self.seed.max(1);
-        x ^= x << 13;
-        x ^= x >> 17;
-        x ^= x << 5;
-        self.seed = x;
-        x
+        self.seed = math::random::xorshift(self.seed);
+        self.seed
     }
 }
 
