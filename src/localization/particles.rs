@@ -66,9 +66,9 @@ const MOST_TIMES: u8 = 8;
 /// 16·M bytes and about 200, while it resamples as many again on the stack, and 8·B.
 ///
 /// A scan that follows enough motion costs 16 particles on an M4F, of 96 points, 0.13 M instructions by [`Proposal::Motion`] and
-/// 2.44 M by [`Proposal::Improved`]; by [`Weighting::BeamModel`] a ray a beam instead of a byte, many times that. For the same error the
-/// improved proposal needs a tenth of the particles or less, so that it costs up to twice the instructions where wheels are
-/// good and less where they are not, and always a tenth of the memory.
+/// 2.44 M by [`Proposal::Improved`]; by [`Weighting::BeamModel`] a ray a beam instead of a byte, many times that. Where wheels are
+/// right to a fifth, the improved proposal needs a tenth of the particles for the same error; where they tell the wrong way for
+/// seconds, few particles of either proposal lose the robot.
 #[derive(Debug, Clone)]
 pub struct ParticleFilter<'a, const M: usize, const B: usize> {
     field: LikelihoodField<&'a [u8]>,
