@@ -96,7 +96,7 @@ impl<const N: usize> Points<N> {
     pub fn assign(&mut self, scan: &Scan<N>, twist: Twist, config: &PointsConfig) {
         self.points.clear();
         let least = millimetres(config.min_range).max(1);
-        let sweep = Sweep {
+        let mut sweep = Sweep {
             least,
             span: millimetres(config.max_range).saturating_sub(least),
             flip: if config.mount.upside_down { 0xffff } else { 0 },
@@ -174,17 +174,17 @@ impl Sweep {
         ))
     }
 
+    #[inline]
     fn place<const N: usize>(
-        &self,
+        &mut self,
         (bearing, range, age): (u16, u16, u16),
         points: &mut heapless::Vec<ScanPoint, N>,
     ) {
         // In two's complement the negative is all bits flipped, and one more.
         let bearing = (bearing ^ self.flip).wrapping_add(self.flip & 1);
-        let point = ScanPoint::at(Bearing(bearing), range);
-        let moved = match &self.deskew {
-            Some(deskew) => deskew.apply(point, u32::from(self.last.saturating_sub(age)) << 4),
-            None => Some(point),
+        let moved = match &mut self.deskew {
+            Some(deskew) => deskew.apply(bearing, range, self.last.saturating_sub(age)),
+            None => Some(ScanPoint::at(Bearing(bearing), range)),
         };
         if let Some(point) = moved {
             // As many points as beams at most: it fits.
@@ -214,6 +214,31 @@ struct Deskew {
     /// Translation per 2¹⁶ µs, in the frame at the scan's end (1/1024 mm).
     x: i32,
     y: i32,
+    /// The one that the last beam was in: beams mostly come in the order of their times.
+    stretch: Stretch,
+}
+
+/// Log2 of the length of a [`Stretch`] (16 µs): 8 ms, in which the fastest robot turns by 19°.
+const STRETCH_BITS: u32 = 9;
+
+/// A part of the sweep over which the lidar is taken to have moved straight and evenly.
+#[derive(Clone, Copy)]
+struct Stretch {
+    /// How many lie between it and the scan's end.
+    number: u32,
+    /// Where it ends, and how much there is from there to where it begins.
+    end: Place,
+    more: Place,
+}
+
+/// Where the lidar was, seen from the scan's end.
+#[derive(Clone, Copy)]
+struct Place {
+    /// 2⁻³² turn.
+    turn: i32,
+    /// 1/1024 mm.
+    x: i32,
+    y: i32,
 }
 
 impl Deskew {
@@ -227,58 +252,119 @@ impl Deskew {
         if still || !(math::abs(twist.omega) < 40.0 && speed < 100.0) {
             return None;
         }
+        let none = Place {
+            turn: 0,
+            x: 0,
+            y: 0,
+        };
         Some(Self {
             turn: math::round_to_i32(
                 twist.omega * TICK * (4_294_967_296.0 / core::f32::consts::TAU),
             ),
             x: math::round_to_i32(twist.vx * TICK * 1_024_000.0),
             y: math::round_to_i32(twist.vy * TICK * 1_024_000.0),
+            stretch: Stretch {
+                number: u32::MAX,
+                end: none,
+                more: none,
+            },
         })
     }
 
-    /// The point seen from where the lidar is `age` µs later; `None` where it leaves the numbers' range.
-    fn apply(&self, point: ScanPoint, age: u32) -> Option<ScanPoint> {
-        // The pose at the beam's time, seen from the scan's end: back by the twist over `age`. To second order the
-        // translation of an arc is that of the chord at half its turn.
-        let age = i64::from(if age > 2_000_000 { 2_000_000 } else { age });
-        let turn = -((i64::from(self.turn) * age) >> 16);
-        let (tx, ty) = (
-            (-(i64::from(self.x) * age) >> 16) as i32,
-            (-(i64::from(self.y) * age) >> 16) as i32,
-        );
-        let (half_s, half_c) = math::sin_cos_q15((turn >> 17) as u16);
-        let (mx, my) = (
-            mul_q15(tx, half_c) - mul_q15(ty, half_s),
-            mul_q15(tx, half_s) + mul_q15(ty, half_c),
-        );
-        let (s, c) = math::sin_cos_q15((turn >> 16) as u16);
-        let (px, py) = (i32::from(point.x), i32::from(point.y));
-        let x = ((px * c - py * s) >> 5).wrapping_add(mx);
-        let y = ((px * s + py * c) >> 5).wrapping_add(my);
-        let (x, y) = ((x + 512) >> 10, (y + 512) >> 10);
-        let square = (x.wrapping_mul(x) as u32).wrapping_add(y.wrapping_mul(y) as u32);
-        let limit = i32::from(MAX_RANGE_MM);
-        if !(-limit..=limit).contains(&x) || !(-limit..=limit).contains(&y) || square > 0x3d09_0000
-        {
+    /// Where the lidar was `age` (16 µs) before the scan's end. To second order the translation of an arc is that of the
+    /// chord at half its turn.
+    fn place(&self, age: u32) -> Place {
+        let times = |per_tick: i32| -((i64::from(per_tick) * i64::from(age)) >> 12);
+        let turn = times(self.turn);
+        let (s, c) = math::sin_cos_q15((turn >> 17) as u16);
+        let (s, c) = (i64::from(s), i64::from(c));
+        let (x, y) = (times(self.x), times(self.y));
+        Place {
+            turn: turn as i32,
+            x: ((x * c - y * s) >> 15) as i32,
+            y: ((x * s + y * c) >> 15) as i32,
+        }
+    }
+
+    /// Apart, so that the loop over the beams keeps its registers.
+    #[cold]
+    #[inline(never)]
+    fn enter(&mut self, number: u32) {
+        let end = self.place(number << STRETCH_BITS);
+        let start = self.place((number + 1) << STRETCH_BITS);
+        self.stretch = Stretch {
+            number,
+            end,
+            more: Place {
+                turn: start.turn.wrapping_sub(end.turn),
+                x: start.x.wrapping_sub(end.x),
+                y: start.y.wrapping_sub(end.y),
+            },
+        };
+    }
+
+    /// The place that a beam hit `age` (16 µs) before the scan's end, as seen from there; `None` where it leaves the
+    /// numbers' range.
+    fn apply(&mut self, bearing: u16, range: u16, age: u16) -> Option<ScanPoint> {
+        let number = u32::from(age) >> STRETCH_BITS;
+        if number != self.stretch.number {
+            self.enter(number);
+        }
+        let Stretch { end, more, .. } = self.stretch;
+        let part = i32::from(age) & ((1 << STRETCH_BITS) - 1);
+        // In 8 ms a robot moves less than a metre and turns less than a sixth: these stay in 32 bits.
+        let turn = end.turn.wrapping_add((more.turn >> STRETCH_BITS) * part);
+        let x = end.x + ((more.x * part) >> STRETCH_BITS);
+        let y = end.y + ((more.y * part) >> STRETCH_BITS);
+        let bearing = bearing.wrapping_add((turn.wrapping_add(1 << 15) >> 16) as u16);
+        let (s, c) = math::sin_cos_q15(bearing);
+        let r = i32::from(range);
+        let (px, py) = (((r * c) >> 5) + x, ((r * s) >> 5) + y);
+        let (px, py) = ((px + 512) >> 10, (py + 512) >> 10);
+        // The translation along the beam and across it (1/64 mm).
+        let (tx, ty) = (x >> 4, y >> 4);
+        let (far_x, far_y) = (tx + (1 << 15), ty + (1 << 15));
+        if (far_x | far_y) as u32 >> 16 != 0 {
+            return seen(px, py);
+        }
+        let along = (tx * c + ty * s) >> 15;
+        let across = (ty * c - tx * s) >> 15;
+        let distance = (r << 6) + along;
+        if distance < 1 << 13 || across.abs() > distance >> 4 {
+            return seen(px, py);
+        }
+        // A small angle is its own tangent (2⁻¹⁸ rad here); the distance grows by half of its square.
+        let angle = (across * math::reciprocal(distance as u32 >> 6) as i32) >> 12;
+        let range = (distance + ((across * angle) >> 19) + 32) >> 6;
+        if range > i32::from(MAX_RANGE_MM) {
             return None;
         }
         Some(ScanPoint {
-            x: x as i16,
-            y: y as i16,
-            bearing: Bearing(math::atan2_turn(y, x)),
-            range: math::isqrt_near(square, u32::from(point.range)) as u16,
+            x: px as i16,
+            y: py as i16,
+            // 2¹⁶/2π units in a radian, 1/64 mm, and the reciprocal's 2²⁴.
+            bearing: Bearing(bearing.wrapping_add(((angle * 163 + (1 << 11)) >> 12) as u16)),
+            range: range as u16,
         })
     }
 }
 
-/// Product with a Q15 factor, rounded down.
-fn mul_q15(a: i32, q15: i32) -> i32 {
-    // Seldom more than 16 bits (64 mm): a Cortex-M0 has no wider product.
-    if a == i32::from(a as i16) {
-        (a * q15) >> 15
-    } else {
-        ((i64::from(a) * i64::from(q15)) >> 15) as i32
+/// The point at a place (mm); `None` where it is too far away.
+// Seldom needed: beside the lidar, or where it moves half a metre in a revolution.
+#[cold]
+#[inline(never)]
+fn seen(x: i32, y: i32) -> Option<ScanPoint> {
+    let limit = i32::from(MAX_RANGE_MM);
+    if !(-limit..=limit).contains(&x) || !(-limit..=limit).contains(&y) {
+        return None;
     }
+    let range = math::isqrt((x * x + y * y) as u32);
+    (range <= u32::from(MAX_RANGE_MM)).then_some(ScanPoint {
+        x: x as i16,
+        y: y as i16,
+        bearing: Bearing(math::atan2_turn(y, x)),
+        range: range as u16,
+    })
 }
 
 #[cfg(test)]
@@ -374,6 +460,10 @@ mod tests {
                     dx.abs() < 2.0 && dy.abs() < 2.0,
                     "{twist:?}: off by ({dx}, {dy}) mm"
                 );
+                // In polar form it is the same place.
+                let polar = ScanPoint::at(p.bearing, p.range);
+                let (dx, dy) = (p.x.abs_diff(polar.x), p.y.abs_diff(polar.y));
+                assert!(dx < 2 && dy < 2, "{twist:?}: {p:?}, {polar:?}");
             }
         }
     }
