@@ -8,6 +8,7 @@ pub mod emulator;
 pub mod fields;
 pub mod firmware;
 pub mod maps;
+pub mod profile;
 pub mod real;
 pub mod real_card;
 pub mod rp2040js;

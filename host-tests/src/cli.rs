@@ -11,6 +11,7 @@ mod output;
 mod pairs;
 mod particles;
 mod prior;
+mod profile;
 mod prune;
 mod regress;
 mod replay;
@@ -52,6 +53,7 @@ enum Command {
     Lidars(lidars::Args),
     Live(live::Args),
     Bench(bench::Args),
+    Profile(profile::Args),
     Card(card::Args),
     Prune(prune::Args),
     Scenes(scenes::Args),
@@ -79,6 +81,7 @@ pub fn run() -> ExitCode {
         Some(Command::Pairs(args)) => pairs::run(&args),
         Some(Command::Particles(args)) => particles::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),
+        Some(Command::Profile(args)) => profile::run(&args),
         Some(Command::Card(args)) => card::run(&args),
         Some(Command::Prune(args)) => prune::run(&args),
         Some(Command::Scenes(args)) => scenes::run(&args),

@@ -93,6 +93,26 @@ impl Firmware {
         Ok(kept)
     }
 
+    /// Builds one of its programs with a line table; gives the ELF file.
+    pub fn build_with_lines(&self, program: &str) -> Result<PathBuf> {
+        let target_dir = root().join("target/profile");
+        let output = cargo()
+            .args(["build", "--release", "--bin", program])
+            .env("CARGO_PROFILE_RELEASE_DEBUG", "1")
+            .arg("--target-dir")
+            .arg(&target_dir)
+            .current_dir(root().join("boards").join(self.package))
+            .output()?;
+        if !output.status.success() {
+            bail!(
+                "boards/{}: {program} does not build:\n{}",
+                self.package,
+                String::from_utf8_lossy(&output.stderr)
+            );
+        }
+        Ok(target_dir.join(self.target).join("release").join(program))
+    }
+
     /// Builds its test of this name for the board; gives the ELF file.
     pub fn build_test(&self, test: &str) -> Result<PathBuf> {
         let folder = root().join("boards").join(self.package);
