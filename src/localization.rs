@@ -7,9 +7,9 @@
 //!     └──────────────────────┴──────────────┘
 //! ```
 //!
-//! Deterministic: no random particles. The search looks at every place and heading; what it finds is followed until
-//! the robot's motion has told the candidates apart. [`Localizer::update`] and [`Localizer::step`] do a bounded
-//! amount of work per call.
+//! A [`Localizer`] draws nothing at random: its search looks at every place and heading; what it finds is followed until
+//! the robot's motion has told the candidates apart. [`Localizer::update`] and [`Localizer::step`] do a bounded amount of
+//! work per call. Poses drawn at random are in `particles`, behind the feature of that name.
 
 mod config;
 #[cfg(not(feature = "internals"))]

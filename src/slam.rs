@@ -6,7 +6,6 @@
 //! | find earlier keyframes that may see the same place | `loops`, `drift` |
 //! | find the place of a robot that was carried | `recognition`, `joining` |
 //! | match against what those around that place see together, check, wait for confirmation | `closing`, `verify` |
-//! | a map without loops that rolls with the robot, in less memory | `rolling` |
 //! | solve the pose graph, loops weighted by how well they agree | `solver`, `graph` |
 //! | remove the keyframe that tells least where the memory is full | `room`, `pruning` |
 //! | draw the map from the keyframes | `rendering` |
@@ -16,14 +15,17 @@
 //! ([`Slam::step`]). Poses are given in the frame of a keyframe ([`Placed`]), since keyframes still move.
 //!
 //! The map is its keyframes, poses and scans of two bytes a point, and the motions measured between them. A scan of now is
-//! matched with what up to eight keyframes around a place saw, as one scan (see
-//! `matching::virtual_scan`): one keyframe alone overlaps too little where a lidar sees to one side
-//! only. Where the graph knows to 10 cm (σ) where the robot is, a match alone is a loop; elsewhere two others must close a
-//! cycle with it. Loops that contradict the rest later lose their weight in the solution (dynamic covariance scaling).
+//! matched with what up to eight keyframes around a place saw, as one scan (see `matching::virtual_scan`): one keyframe alone
+//! overlaps too little where a lidar sees to one side only. Where the graph knows to 10 cm (σ) where the robot is, a match
+//! alone is a loop; elsewhere two others must close a cycle with it. Loops that contradict the rest later lose their weight in
+//! the solution (dynamic covariance scaling).
 //!
 //! A robot that was carried (odometry gave up its keyframe and tells that the heading may be any) begins a submap of its own.
 //! Its keyframes are compared with all others, and it is joined to theirs once matches from places some metres apart agree.
 //! Until then [`Slam::is_located`] is false.
+//!
+//! In less memory and without loops there is a map that rolls with the robot, `rolling`; `pipeline::RollingMapper` lays it over
+//! odometry.
 //!
 //! What it does not do: doors that changed stay as the keyframes saw them, and a keyframe's covariance in the map is not
 //! computed.

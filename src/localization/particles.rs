@@ -7,8 +7,8 @@
 //!
 //! It follows a pose that is known roughly. A robot of which nothing is known it finds only with particles enough that some
 //! are near: [`Localizer`](super::Localizer) looks everywhere. Unlike that it keeps several poses alive for as long as nothing
-//! tells them apart, and says so by its covariance. Where scans do not fit, particles are drawn from farther and farther around, until one fits again. It
-//! repeats itself: the same seed, scans and motions give the same bits on every machine.
+//! tells them apart, and says so by its covariance. Where scans do not fit, particles are drawn from farther and farther
+//! around, until one fits again. It repeats itself: the same seed, scans and motions give the same bits on every machine.
 //!
 //! ```
 //! use beamfix::{
@@ -61,14 +61,15 @@ const MATCH_REACH: f32 = 2.5;
 /// Poses are drawn from so many times that far around at most.
 const MOST_TIMES: u8 = 8;
 
-/// A particle filter with room for M particles, in a map that lies in flash; B points of a scan are used, 60 to 128.
+/// A particle filter with room for M particles, in a map that lies in flash; of each scan at most B points are used, evenly
+/// spread: take 60 to 128.
 ///
-/// 16·M bytes and about 200, while it resamples as many again on the stack, and 8·B.
+/// 16·M bytes and about 230. On the stack 8·B while it takes a scan, and 16·M while it resamples.
 ///
-/// A scan that follows enough motion costs 16 particles on an M4F, of 96 points, 0.13 M instructions by [`Proposal::Motion`] and
-/// 2.44 M by [`Proposal::Improved`]; by [`Weighting::BeamModel`] a ray a beam instead of a byte, many times that. Where wheels are
-/// right to a fifth, the improved proposal needs a tenth of the particles for the same error; where they tell the wrong way for
-/// seconds, few particles of either proposal lose the robot.
+/// With 16 particles and 96 points a scan that follows enough motion costs 0.13 M instructions of an M4F by [`Proposal::Motion`]
+/// and 2.44 M by [`Proposal::Improved`]; by [`Weighting::BeamModel`] many times that, a ray a beam instead of a byte. Where
+/// wheels are right to a fifth, the improved proposal needs a tenth of the particles for the same error; where they tell the
+/// wrong way for seconds, few particles of either proposal lose the robot.
 #[derive(Debug, Clone)]
 pub struct ParticleFilter<'a, const M: usize, const B: usize> {
     field: LikelihoodField<&'a [u8]>,
@@ -110,7 +111,7 @@ impl<'a, const M: usize, const B: usize> ParticleFilter<'a, M, B> {
         }
     }
 
-    /// The same, its scans weighed like this.
+    /// This filter with its scans weighed by another sensor model: a new one weighs them by the likelihood field.
     #[must_use]
     pub const fn weighed_by(mut self, weighting: Weighting<'a>) -> Self {
         self.weighting = weighting;
@@ -123,7 +124,8 @@ impl<'a, const M: usize, const B: usize> ParticleFilter<'a, M, B> {
         self.start_at_any(&[map_from_lidar], sigmas);
     }
 
-    /// The same around several poses one of which is the right one; all over the map where there is none.
+    /// Particles around several poses of the lidar in the map, one of which is the right one, as many around each; the same
+    /// standard deviations (m, rad) for all. All over the map where there is no pose, or a number is not finite.
     pub fn start_at_any(&mut self, maps_from_lidar: &[Pose], (position, heading): (f32, f32)) {
         let are_poses =
             !maps_from_lidar.is_empty() && maps_from_lidar.iter().all(|p| p.is_finite());
@@ -187,7 +189,7 @@ impl<'a, const M: usize, const B: usize> ParticleFilter<'a, M, B> {
         self.mean = Mean::of(&self.particles, &Sym3::default());
     }
 
-    /// Poses and weights, the weights summing to 1.
+    /// Poses of the lidar in the map (m, rad) where the particles were moved last, and their weights, which sum to 1.
     pub fn particles(&self) -> impl Iterator<Item = (Pose, f32)> + '_ {
         let weight = |particle: &Particle| math::exp(math::max(particle.log_weight, -80.0));
         let sum: f32 = self.particles.iter().map(weight).sum();
@@ -201,7 +203,7 @@ impl<'a, const M: usize, const B: usize> ParticleFilter<'a, M, B> {
         (self.updates, self.matched)
     }
 
-    /// Takes the lidar's motion since it was told last.
+    /// Takes the lidar's motion since it was told last: several add up until a scan moves the particles.
     pub fn moved(&mut self, motion: &Motion) {
         self.pending.add(motion);
     }

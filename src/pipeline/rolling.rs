@@ -13,7 +13,8 @@ use crate::{
 pub type Mapper64k = RollingMapper<512, 36, 180, 512>;
 
 /// An [`Odometry`] of N beams a revolution, and over it a map of the last K keyframes of B points, seen together in V
-/// directions: for a [`Tracker`](super::Tracker) or a [`Pipeline`](super::Pipeline).
+/// directions: for a [`Tracker`](super::Tracker) or a [`Pipeline`](super::Pipeline). The odometry, and about
+/// `(46 + 2·B)·K + 32·V + 8·B` bytes.
 ///
 /// Every scan is matched once more, against what up to 12 keyframes around the robot saw as one: it drifts less than
 /// odometry, and not at all while it stays among them. There are no loops, and nothing is kept of what was left behind.
@@ -35,7 +36,7 @@ pub struct RollingStep {
     pub covariance: Covariance,
     /// Whether the scan fitted the map; else it is where odometry leads from the scan before.
     pub is_matched: bool,
-    /// What odometry says, in its own frame.
+    /// What odometry says, in its own frame: that is the same at the start, and drifts away.
     pub odometry: Step,
 }
 

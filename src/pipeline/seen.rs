@@ -36,7 +36,8 @@ impl<const N: usize> Seen<N> {
             theta: ego.credible_rotation().unwrap_or(0.0),
             ..Pose::IDENTITY
         });
-        // After a pause longer than any revolution, or for the first scan, the motion is taken to be the scan's own.
+        // After a pause longer than any revolution the motion is taken to be the scan's own; for the first scan too, unless the
+        // clock has begun less than two seconds before.
         let micros = scan.end_us().wrapping_sub(self.end_us);
         self.end_us = scan.end_us();
         let seconds = if micros < 2_000_000 {

@@ -142,7 +142,7 @@ impl Deskew {
         Some(ScanPoint {
             x: px as i16,
             y: py as i16,
-            // 2¹⁶/2π units in a radian, 1/64 mm, and the reciprocal's 2²⁴.
+            // 2¹⁶/2π of the bearing's units are a radian, which `angle` counts in 2⁻¹⁸: 163/2¹² of one each.
             bearing: Bearing(bearing.wrapping_add(((angle * 163 + (1 << 11)) >> 12) as u16)),
             range: range as u16,
         })

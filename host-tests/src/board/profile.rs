@@ -25,8 +25,8 @@ pub struct Share {
     pub instructions: u64,
 }
 
-/// Executed instructions of the library alone by function over bytes of an LD06, most first. With `inlined`, code that was inlined counts for the function that
-/// it was written in; else for the one that it was compiled into.
+/// Executed instructions of the library alone by function over bytes of an LD06, most first. With `inlined`, code that was
+/// inlined counts for the function that it was written in; else for the one that it was compiled into.
 pub fn profile(board: &Board, bytes: &[u8], inlined: bool) -> Result<Vec<Share>> {
     let elf = board.firmware.build_with_lines("pipeline")?;
     let counts = executed(board, &elf, bytes)?;

@@ -22,8 +22,8 @@ pub(super) struct Particle {
 pub enum Verdict {
     /// The particles agree, and the scan fits their mean.
     Known,
-    /// The particles agree, and the scan does not fit, or beams go through walls: people around, or the robot was carried. Or it fits, and not yet
-    /// enough scans did to call the pose found.
+    /// The particles agree, and the scan does not fit, or beams go through walls: people around, or the robot was carried. Or
+    /// it fits, and not yet enough scans did to call the pose found.
     Doubtful,
     /// The particles are too far apart for their mean to be a place: the pose is one of several, or anywhere.
     Spread,
@@ -35,18 +35,20 @@ pub enum Verdict {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Belief {
-    /// Weighted mean of the particles, in the map (m, rad). Where they are spread this may be a place where none of them is.
+    /// Weighted mean of the particles, in the map (m, rad). Where they are spread this may be a place where none of them is;
+    /// where it is no finite number, the map's origin.
     pub pose: Pose,
-    /// Of the particles about it, headings the short way round (m², m·rad, rad²). Few particles scatter less than what they
-    /// were drawn from: that part is added. What all have inherited from one ancestor is not in it: the fewer they are, the
-    /// larger the error really is.
+    /// Covariance of the particles about `pose`, along the map's axes, headings the short way round (m², m·rad, rad²); zero
+    /// where it is no finite number, and the verdict then is no pose. Few particles scatter less than what they were drawn
+    /// from: that part is added. What all have inherited from one ancestor is not in it: the fewer they are, the larger the
+    /// error really is.
     pub covariance: Covariance,
     /// Particles that count: `1 / Σw²`, from 1 to all of them.
     pub effective: f32,
     /// Quality of the scan at the mean, as a localizer has it: 1 where all beams end on surfaces, negative where most go
     /// through some.
     pub fit: f32,
-    /// What to make of it.
+    /// Whether `pose` is to be believed.
     pub verdict: Verdict,
 }
 

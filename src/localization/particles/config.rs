@@ -26,10 +26,11 @@ pub struct ParticleConfig {
     pub proposal: Proposal,
     /// Particles in use, as far as there is room. Default `u16::MAX`: all that there is room for.
     pub particles: u16,
-    /// Beams of a scan that count as independent where the pose is known: more than these share their weight. Default 96: as
-    /// many as are used.
+    /// Beams of a scan that count as independent where the pose is known: more than these share their weight. Default 96: all
+    /// of a filter of 96 points.
     pub independent_beams: f32,
-    /// The same where it is not: poses that fit about as well as others live on. Default 8: a room has few walls.
+    /// Beams of a scan that count as independent where the pose is not known: poses that fit about as well as others live on.
+    /// Default 8: a room has few walls.
     pub spread_beams: f32,
     /// Least way of the lidar (m) from one scan that is weighed to the next. Default 0.05: a cell of the map.
     pub min_distance: f32,
@@ -44,16 +45,17 @@ pub struct ParticleConfig {
     pub max_bad_scans: u8,
     /// Least quality of the scans by which a pose is found. Default 0.55, as for a localizer's candidates.
     pub min_found_quality: f32,
-    /// So many of them in a row. Default 5.
+    /// Scans in a row of at least `min_found_quality` by which a pose is found. Default 5.
     pub min_found_scans: u8,
-    /// Largest standard deviation of a pose that is known, in its worst direction (m). Default 0.2: from a little less on a
+    /// Largest standard deviation of a pose that is known, in its worst direction (m). Default 0.2: from about so far off a
     /// match leads back.
     pub max_position_sigma: f32,
     /// Largest standard deviation of the heading of a pose that is known (rad). Default 0.1.
     pub max_heading_sigma: f32,
-    /// Of the matches. Default [`FieldConfig::DEFAULT`], but a fifth of the beams near surfaces will do, as for a localizer.
+    /// Settings of the matches. Default [`FieldConfig::DEFAULT`], but a fifth of the beams near surfaces will do, as for a
+    /// localizer.
     pub field: FieldConfig,
-    /// Of the random numbers. Default 1.
+    /// Seed of the random numbers: the same seed repeats a run to the bit. Default 1.
     pub seed: u32,
 }
 
