@@ -286,7 +286,7 @@ impl<'a, const M: usize, const B: usize> ParticleFilter<'a, M, B> {
                 .widen(f32::from(times) * MATCH_REACH * self.field.scale().sigma);
         }
         let is_finite = pose.is_finite() && covariance.to_array().iter().all(|v| v.is_finite());
-        let is_one = is_finite && !self.config.is_spread(&covariance);
+        let is_one = is_finite && !self.particles.is_empty() && !self.config.is_spread(&covariance);
         let is_confident = quality.is_confident(self.config.max_wall_crossings);
         self.good_scans = if is_one && is_confident && fit >= self.config.min_found_quality {
             self.good_scans.saturating_add(1)

@@ -42,12 +42,15 @@ struct Place {
 }
 
 impl Deskew {
-    /// `None` where the motion over the sweep is too small to matter (0.1 mm, 0.001°), or faster than any robot (40 rad/s, 100 m/s).
+    /// `None` where the motion over the sweep (s) is too small to matter (0.1 mm, 0.001°), or faster than any robot (40 rad/s,
+    /// 100 m/s as seen from the scan's end).
     pub fn new(twist: Twist, duration: f32) -> Option<Self> {
         const TICK: f32 = 0.065_536;
         let motion = twist.displacement(duration);
         let still = motion.distance() < 1e-4 && math::abs(motion.theta) < 2e-5;
-        let speed = math::abs(twist.vx) + math::abs(twist.vy);
+        // Seen from the scan's end, a turn since then makes the lidar faster than it was.
+        let speed = (math::abs(twist.vx) + math::abs(twist.vy))
+            * (1.0 + 0.5 * math::abs(twist.omega) * duration);
         // The negated form refuses NaN too.
         if still || !(math::abs(twist.omega) < 40.0 && speed < 100.0) {
             return None;

@@ -311,16 +311,15 @@ mod tests {
     fn an_impossible_twist_is_ignored() {
         let mut points = Points::<8>::new();
         let scan = scan(&[(0.0, 1.0, 0), (90.0, 2.0, 100_000)]);
-        for omega in [f32::NAN, f32::INFINITY, 1e9] {
-            points.assign(
-                &scan,
-                Twist {
-                    vx: 0.0,
-                    vy: 0.0,
-                    omega,
-                },
-                &PointsConfig::DEFAULT,
-            );
+        // The last one is a robot's, but for what its turn makes of its speed.
+        for (vx, omega) in [
+            (0.0, f32::NAN),
+            (0.0, f32::INFINITY),
+            (0.0, 1e9),
+            (64.0, 39.0),
+        ] {
+            let twist = Twist { vx, vy: 0.0, omega };
+            points.assign(&scan, twist, &PointsConfig::DEFAULT);
             assert_eq!(
                 (points.as_slice()[0].x, points.as_slice()[0].y),
                 (1000, 0),

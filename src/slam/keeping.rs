@@ -17,8 +17,9 @@ use crate::{
 
 /// Fewest points of a keyframe: what a match needs.
 const MIN_POINTS: usize = 30;
-/// Odometry that loses a radian (rad², σ²) from one scan to the next has given up its keyframe: the robot may be anywhere.
-const CARRIED: f32 = 1.0;
+/// Odometry whose variance of the heading grows by more (rad²) from one scan to the next has given up its keyframe: the robot may be
+/// anywhere.
+pub(super) const CARRIED: f32 = 1.0;
 /// What is known of a motion that nobody measured: 10 m and 180°.
 const NOTHING: Covariance = Covariance(Sym3::diagonal(100.0, 100.0, 10.0));
 /// No robot drives farther between two keyframes (m).

@@ -6,7 +6,7 @@
 
 use heapless::Vec;
 
-use super::{growth::growth, store::PackedScan};
+use super::{growth::growth, keeping::CARRIED, store::PackedScan};
 use crate::{
     geometry::Pose,
     linalg::{Covariance, Sym3},
@@ -21,7 +21,7 @@ use crate::{
 
 /// Of the odometry's keyframes one is kept where none of the window is so near (m).
 const KEYFRAME_DISTANCE: f32 = 0.35;
-/// And, of a lidar that does not see all around, none that faces alike to this angle (rad).
+/// A lidar that does not see all around has one keyframe kept at a place for each such angle (rad).
 const KEYFRAME_ROTATION: f32 = 0.5;
 /// Most keyframes that are seen as one.
 const SEEN: usize = 12;
@@ -31,7 +31,7 @@ const REACH: f32 = 6.0;
 const TURN: f32 = 0.5;
 /// They are seen anew from where the robot is once it has moved so far (m) from where they were seen last.
 const VIEW_DISTANCE: f32 = 0.3;
-/// Or turned so far (rad).
+/// They are seen anew once the robot has turned so far (rad) since they were seen last.
 const VIEW_ROTATION: f32 = 0.5;
 /// Least score of a match.
 const MIN_SCORE: f32 = 0.4;
@@ -46,18 +46,16 @@ const GAIN: f32 = 0.5;
 const MATCH_INFLATION: f32 = 4.0;
 /// A direction that a smaller share of the beams constrains is left as odometry says.
 const SHARE: f32 = 0.035;
-/// And a smaller one than this while something moves along with the robot, which hides up to a sixth of the view.
+/// The same share while something moves along with the robot, which hides up to a sixth of the view.
 const COMPANION: f32 = 0.17;
 /// Something moves along where one in so many points of a keyframe did.
 const COMPANIONS: usize = 20;
-/// So many keyframes after it was seen last.
+/// For so many keyframes after it was seen last, something is taken to move along.
 const COMPANY: u8 = 20;
 /// Fewest points of a keyframe: what a match needs.
 const MIN_POINTS: usize = 30;
 /// The window begins anew with a keyframe after so many scans in a row that did not fit.
 const MOST_UNMATCHED: u8 = 5;
-/// Odometry that loses a radian (rad², σ²) from one scan to the next has given up its keyframe: the robot may be anywhere.
-const CARRIED: f32 = 1.0;
 
 /// The last K keyframes of B points, and what they show together in V directions: about `(46 + 2·B)·K + 32·V + 8·B` bytes.
 #[derive(Debug, Clone)]

@@ -105,6 +105,9 @@ impl Converter {
 
     /// Takes the robot's pose by its wheels. In a map, where they tell how the robot moves, they are a transform.
     pub fn wheels(&mut self, pose: Pose, stamp_ns: i64) -> Option<Message> {
+        if !pose.is_finite() {
+            return None;
+        }
         self.wheels.push_back((stamp_ns, pose));
         while let Some(&(oldest, _)) = self.wheels.front()
             && oldest < stamp_ns - KEPT_NS
@@ -130,6 +133,7 @@ impl Converter {
         // It starts from its origin, and so may its lidar's clock.
         (self.last, self.period, self.is_fresh) = (None, None, false);
         self.clock = Clock::default();
+        self.sweep.interrupt();
         Message::Mount(mount(ready.mount.mount(), now_ns))
     }
 
@@ -147,7 +151,9 @@ impl Converter {
         self.period = None;
         let mut twist = Twist::ZERO;
         if let Some(before) = before {
+            // One that went back is that of a board that has started again, unheard.
             let steps = pose.sequence.wrapping_sub(before.pose.sequence);
+            let steps = if steps < 1 << 15 { steps } else { 0 };
             let seconds = pose.time_us.wrapping_sub(before.pose.time_us) as f32 * 1e-6;
             self.missing += u32::from(steps).saturating_sub(1);
             if steps > 0 && seconds > 0.0 && seconds < LONGEST_STEP {

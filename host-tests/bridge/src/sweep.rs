@@ -52,9 +52,18 @@ impl Sweep {
                     done = self.sorted(&beams);
                 }
             }
-            self.beams.push((bearing.0, mm));
+            // Whoever sends beams without an end fills no memory.
+            if self.is_whole && self.beams.len() < TURN as usize {
+                self.beams.push((bearing.0, mm));
+            }
         }
         done
+    }
+
+    /// Forgets the revolution in progress: the board has started again.
+    pub fn interrupt(&mut self) {
+        self.beams.clear();
+        self.is_whole = false;
     }
 
     fn sorted(&mut self, beams: &[(u16, u16)]) -> Option<Array> {

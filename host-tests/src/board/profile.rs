@@ -143,28 +143,29 @@ fn function(loader: &addr2line::Loader, address: u64, inlined: bool) -> String {
     })
 }
 
-/// A path without type parameters and hashes; of a method of a trait, that of the type.
+/// A path without type parameters; of a method of a trait, the type's path and the method's name.
 fn plain(name: &str) -> String {
-    let mut depth = 0;
-    let name = name
-        .strip_prefix('<')
-        .map_or_else(|| name.to_owned(), |name| name.replacen('>', "", 1));
-    let name = name.split(" as ").next().map_or(name.clone(), |path| {
-        let method = name.rsplit("::").next().unwrap_or_default();
-        match path == name {
-            true => name.clone(),
-            false => format!("{path}::{method}"),
-        }
-    });
-    let mut text = String::new();
-    for c in name.chars() {
-        match c {
-            '<' => depth += 1,
-            '>' => depth -= 1,
-            _ if depth == 0 => text.push(c),
-            _ => {}
-        }
-    }
+    let depth_at = |name: &str, at: usize| {
+        let before = &name[..at];
+        before.matches('<').count() as i32 - before.matches('>').count() as i32
+    };
+    // `<Type as Trait>::method`
+    let whole = name
+        .match_indices(" as ")
+        .find(|&(at, _)| name.starts_with('<') && depth_at(name, at) == 1)
+        .map_or_else(
+            || name.to_owned(),
+            |(at, _)| {
+                let method = name.rsplit("::").next().unwrap_or_default();
+                format!("{}::{method}", &name[1..at])
+            },
+        );
+    let outside = |&(at, c): &(usize, char)| !"<>".contains(c) && depth_at(&whole, at) == 0;
+    let text: String = whole
+        .char_indices()
+        .filter(outside)
+        .map(|(_, c)| c)
+        .collect();
     text.replace("::::", "::")
 }
 
@@ -179,8 +180,10 @@ mod tests {
             "beamfix::scan::points::Points::assign"
         );
         assert_eq!(
-            plain("<beamfix::lidar::sensors::ld06::Parser as beamfix::lidar::Protocol>::push"),
-            "beamfix::lidar::sensors::ld06::Parser::push"
+            plain(
+                "<beamfix::odometry::state::Odometry<456> as beamfix::pipeline::estimator::Estimator<456>>::update"
+            ),
+            "beamfix::odometry::state::Odometry::update"
         );
     }
 }

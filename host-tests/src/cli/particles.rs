@@ -22,16 +22,16 @@ pub struct Args {
     /// The log.
     log: PathBuf,
     /// Seeds of the random numbers.
-    #[arg(long, default_value_t = 20)]
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
     seeds: u32,
     /// The first of them.
     #[arg(long, default_value_t = 0)]
     first_seed: u32,
     /// Numbers of particles drawn from the wheels alone.
-    #[arg(long, value_delimiter = ',', default_values_t = [5, 10, 20, 40, 80, 160, 320, 640])]
+    #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=MOST as i64), default_values_t = [5, 10, 20, 40, 80, 160, 320, 640])]
     motion: Vec<u16>,
     /// Numbers of particles drawn from wheels and match.
-    #[arg(long, value_delimiter = ',', default_values_t = [1, 2, 4, 8, 16, 32])]
+    #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=MOST as i64), default_values_t = [1, 2, 4, 8, 16, 32])]
     improved: Vec<u16>,
     /// What weighs the scans.
     #[arg(long, value_enum, default_value_t = Weight::Field)]

@@ -97,9 +97,10 @@ fn assumptions_are_those_that_the_cards_are_reckoned_with() {
     );
     has("a rise by more than 2 % fails the tests");
     let slam = include_str!("../../src/board/slam.rs");
+    says(slam, "ram_bytes: 64 << 10,");
     says(slam, "ram_bytes: 192 << 10,");
     says(slam, "ram_bytes: 512 << 10,");
-    has("an emulated core with 192 or 512 KB of RAM");
+    has("an emulated core with 64, 192 or 512 KB of RAM");
     assert_eq!(beamfix_sim::place::NAMES.len(), 9);
     has("`simulate --world maze` drives elsewhere (nine places,");
 }

@@ -74,7 +74,7 @@ fn a_rolling_map_is_nearer_than_its_odometry_and_as_honest() {
     assert_eq!(rows.len(), scenes.len(), "{table}");
     for row in rows {
         assert_eq!(row["wrong_and_confident"], 0, "{row}");
-        assert!(row["nees"].as_f64() < Some(3.0), "{row}");
+        assert!(row["nees"].as_f64().is_some_and(|nees| nees < 3.0), "{row}");
     }
     arguments.remove(1);
     let odometry = json(&beamfix(&arguments));

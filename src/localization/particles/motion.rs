@@ -65,8 +65,10 @@ impl Motion {
 
     /// The lidar's motion where this is the robot's.
     pub(crate) fn of_lidar(&self, mount: &Mount) -> Self {
-        let Pose { x, y, theta } = mount.robot_from_lidar;
-        let own = Pose::new(0.0, 0.0, -theta);
+        let own = Pose::new(0.0, 0.0, -mount.robot_from_lidar.theta);
+        // A wrong heading moves the lidar about the robot, where this has come to.
+        let end = self.pose * mount.robot_from_lidar;
+        let (x, y) = (end.x - self.pose.x, end.y - self.pose.y);
         Self {
             pose: mount.lidar_motion(self.pose),
             covariance: self.covariance.transported(x, y).rotated(own),

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// The lattice's step in standard deviations: the product of two normal distributions, summed over three places an axis, has
-/// its integral to within 0.1 %, and 0.93 of its variance.
+/// its integral to within 0.1 % an axis, and 0.93 of its variance.
 const STEP: f32 = 1.732_050_8;
 /// A match farther from where the motion leads than this is another place (squared standard deviations): one in a thousand
 /// right ones is.
@@ -154,7 +154,9 @@ impl<'a> Proposals<'a> {
         let (spread, drawn_from) = spread.root().map_or((width, root), |root| (spread, root));
         let [x, y, turn] = drawn_from.times(random.normal3());
         // The sum is the integral, once it is multiplied by the lattice's cell and the motion's density has its factor.
+        /// The lattice's cell in standard deviations of the axes.
         const CELL: f32 = STEP * STEP * STEP;
+        /// (2π)^1.5: of a normal distribution in three dimensions.
         const TURNS_CUBED: f32 = 15.749_61;
         let volume = CELL * root.determinant() / (TURNS_CUBED * model.determinant());
         Some(Drawn {
