@@ -147,9 +147,8 @@ impl<const N: usize> Odometry<N> {
     }
 }
 
-/// Whether two motions skew a scan differently: by more than 1.5 cm or 0.43°, of which beams at its ends see half; less is
-/// the noise of two ranges, and what it moves the scan's middle by is of second order.
+/// Whether two motions skew a scan differently: by more than 1 cm or 0.3°.
 fn differs(a: Pose, b: Pose) -> bool {
     let off = a.between(b);
-    off.distance() > 0.015 || math::abs(off.theta) > 0.0075
+    off.distance() > 0.01 || math::abs(off.theta) > 0.005
 }

@@ -3,9 +3,6 @@
 use super::Bearing;
 use crate::math;
 
-/// Longest range that a point may have (mm).
-pub(super) const MAX_RANGE_MM: u16 = 32_000;
-
 /// A place hit by a beam: 8 bytes, all integers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(align(4))]
