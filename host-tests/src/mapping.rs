@@ -15,7 +15,8 @@ use beamfix::slam::{Counters, Merged, Placed, SLICE, Slam, SlamConfig};
 use beamfix_sim::Noise;
 
 use crate::formats::Log;
-use crate::pipeline::follow;
+use crate::pipeline::{config, follow};
+use crate::size;
 
 /// The memory configurations that map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,6 +44,22 @@ pub struct Settings {
     pub pruning: Option<(usize, Pruning)>,
     /// Size of a cell (m) of the map that is drawn in the end.
     pub resolution: Option<f32>,
+}
+
+impl Settings {
+    /// Of a whole log with its wheels, in the largest tier; the map is drawn in cells of 5 cm.
+    #[must_use]
+    pub fn of_all(log: &Log, pruning: Option<(usize, Pruning)>) -> Self {
+        let directions = size::fitting(log.scans.iter().map(|scan| &scan.beams[..]));
+        Self {
+            tier: Tier::Of512k,
+            odometry: config(log.mount, directions),
+            slam: SlamConfig::DEFAULT,
+            scans: (log.scans.len(), true),
+            pruning,
+            resolution: Some(0.05),
+        }
+    }
 }
 
 /// Which keyframe goes where there are too many.

@@ -6,21 +6,18 @@ use beamfix::localization::particles::{ParticleConfig, ParticleFilter, Weighting
 use beamfix::pipeline::ParticleLocalizer;
 use beamfix::scan::PointsConfig;
 use beamfix::sensor_model::likelihood_field::{FieldModel, LikelihoodField};
-use beamfix::slam::SlamConfig;
 use beamfix_sim::TruePose;
 
 use crate::formats::Log;
 use crate::formats::field::of_map;
-use crate::mapping::{self, Settings, Tier};
-use crate::pipeline::{config, follow};
+use crate::mapping::{self, Settings};
+use crate::pipeline::follow;
 use crate::{size, sized};
 
 /// Most particles.
 pub const MOST: usize = 1024;
 /// Points of a scan that are used.
 pub const POINTS: usize = 96;
-/// Cells of the map (m).
-const RESOLUTION: f32 = 0.05;
 /// Errors of wheels as a share of their motion.
 const WHEEL_ERROR: f32 = 0.2;
 /// How well the start is known: m, rad.
@@ -57,15 +54,7 @@ pub struct Errors {
 impl<'a> Course<'a> {
     /// Maps a log in the tier of 512 KB, and takes the poses that the map gives in the end as the true ones.
     pub fn mapped(log: &'a Log, tick: &mut dyn FnMut()) -> Result<Self> {
-        let directions = size::fitting(log.scans.iter().map(|scan| &scan.beams[..]));
-        let settings = Settings {
-            tier: Tier::Of512k,
-            odometry: config(log.mount, directions),
-            slam: SlamConfig::DEFAULT,
-            scans: (log.scans.len(), true),
-            pruning: None,
-            resolution: Some(RESOLUTION),
-        };
+        let settings = Settings::of_all(log, None);
         let map = mapping::run(log, &settings, tick)?;
         let grid = map.grid.context("nothing was mapped")?;
         let truth = map

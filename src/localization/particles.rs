@@ -3,7 +3,7 @@
 //! A particle is moved by a [`Motion`] and weighed by how likely it makes the scan. Where it goes to is drawn from a
 //! [`Proposal`]: from what the wheels tell alone, or from what wheels and the scan's match tell together (Grisetti,
 //! Stachniss, Burgard, *Improved Techniques for Grid Mapping With Rao-Blackwellized Particle Filters*, T-RO 2007), which needs
-//! far fewer of them. The map is a likelihood field; scans are weighed by it, or by the beam model ([`Weighting`]).
+//! fewer of them. The map is a likelihood field; scans are weighed by it, or by the beam model ([`Weighting`]).
 //!
 //! It follows a pose that is known roughly. A robot of which nothing is known it finds only with particles enough that some
 //! are near: [`Localizer`](super::Localizer) looks everywhere. Unlike that it keeps several poses alive for as long as nothing
@@ -68,8 +68,8 @@ const MOST_TIMES: u8 = 8;
 ///
 /// With 16 particles and 96 points a scan that follows enough motion costs 0.13 M instructions of an M4F by [`Proposal::Motion`]
 /// and 2.44 M by [`Proposal::Improved`]; by [`Weighting::BeamModel`] many times that, a ray a beam instead of a byte. Where
-/// wheels are right to a fifth, the improved proposal needs a tenth of the particles for the same error; where they tell the
-/// wrong way for seconds, few particles of either proposal lose the robot.
+/// wheels are right to a fifth, 8 particles by the improved proposal are as near as 40 by the motion (`beamfix particles` of a
+/// recorded log); where they tell the wrong way for seconds, few particles of either proposal lose the robot.
 #[derive(Debug, Clone)]
 pub struct ParticleFilter<'a, const M: usize, const B: usize> {
     field: LikelihoodField<&'a [u8]>,

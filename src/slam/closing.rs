@@ -21,7 +21,7 @@ use crate::{
 /// Beams in the coarse passes of a search: with the usual 45 it is the longest piece of work by far, and finds no more.
 const SEARCH_BEAMS: u16 = 32;
 /// Matches of one place are not independent, and their errors larger than each tells by this factor (of σ²).
-const MATCH_INFLATION: f32 = 4.0;
+pub(super) const MATCH_INFLATION: f32 = 4.0;
 
 impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: usize>
     Slam<K, E, L, B, V>

@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Fewest points of a keyframe: what a match needs.
-const MIN_POINTS: usize = 30;
+pub(super) const MIN_POINTS: usize = 30;
 /// Odometry whose variance of the heading grows by more (rad²) from one scan to the next has given up its keyframe: the robot may be
 /// anywhere.
 pub(super) const CARRIED: f32 = 1.0;

@@ -6,7 +6,12 @@
 
 use heapless::Vec;
 
-use super::{growth::growth, keeping::CARRIED, store::PackedScan};
+use super::{
+    closing::MATCH_INFLATION,
+    growth::growth,
+    keeping::{CARRIED, MIN_POINTS},
+    store::PackedScan,
+};
 use crate::{
     geometry::Pose,
     linalg::{Covariance, Sym3},
@@ -42,8 +47,6 @@ const MAX_CORRECTION: f32 = 0.3;
 /// How much of the way from there to the match the robot is moved: errors of a single match are halved, those of odometry are
 /// gone after a few.
 const GAIN: f32 = 0.5;
-/// Matches of one place are not independent, and their errors larger than each tells by this factor (of σ²).
-const MATCH_INFLATION: f32 = 4.0;
 /// A direction that a smaller share of the beams constrains is left as odometry says.
 const SHARE: f32 = 0.035;
 /// The same share while something moves along with the robot, which hides up to a sixth of the view.
@@ -52,8 +55,6 @@ const COMPANION: f32 = 0.17;
 const COMPANIONS: usize = 20;
 /// For so many keyframes after it was seen last, something is taken to move along.
 const COMPANY: u8 = 20;
-/// Fewest points of a keyframe: what a match needs.
-const MIN_POINTS: usize = 30;
 /// The window begins anew with a keyframe after so many scans in a row that did not fit.
 const MOST_UNMATCHED: u8 = 5;
 

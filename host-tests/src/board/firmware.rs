@@ -2,7 +2,7 @@
 
 use std::{
     fs,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::{Command, Stdio},
     sync::Mutex,
 };
@@ -52,7 +52,6 @@ impl Firmware {
     pub fn build(&self, program: &str) -> Result<PathBuf> {
         static ONE_BY_ONE: Mutex<()> = Mutex::new(());
         let _alone = ONE_BY_ONE.lock();
-        let folder = root().join("boards").join(self.package);
         let target_dir = root().join("target/boards");
         let program = match program {
             "" => self.package,
@@ -63,22 +62,8 @@ impl Firmware {
             true => "prove-no-panic",
             false => "",
         };
-        let output = cargo()
-            .args(["build", "--release", "--bin", program])
-            .args(["--features", self.feature, "--features", proof])
-            .arg("--target-dir")
-            .arg(&target_dir)
-            .current_dir(&folder)
-            .output()
-            .with_context(|| format!("cargo could not be started in {}", folder.display()))?;
-        if !output.status.success() {
-            bail!(
-                "boards/{}: {program} does not build (`./test setup` adds the targets):\n{}",
-                self.package,
-                String::from_utf8_lossy(&output.stderr)
-            );
-        }
-        let built = target_dir.join(self.target).join("release").join(program);
+        let options = ["--features", self.feature, "--features", proof];
+        let built = self.compile(program, &options, &target_dir, "0")?;
         let folder = target_dir
             .join("elf")
             .join(self.package)
@@ -95,17 +80,30 @@ impl Firmware {
 
     /// Builds one of its programs with a line table; gives the ELF file.
     pub fn build_with_lines(&self, program: &str) -> Result<PathBuf> {
-        let target_dir = root().join("target/profile");
+        self.compile(program, &[], &root().join("target/profile"), "1")
+    }
+
+    /// Builds one of its programs into a folder, with so much for a debugger; gives the ELF file.
+    fn compile(
+        &self,
+        program: &str,
+        options: &[&str],
+        target_dir: &Path,
+        debug: &str,
+    ) -> Result<PathBuf> {
+        let folder = root().join("boards").join(self.package);
         let output = cargo()
             .args(["build", "--release", "--bin", program])
-            .env("CARGO_PROFILE_RELEASE_DEBUG", "1")
+            .args(options)
+            .env("CARGO_PROFILE_RELEASE_DEBUG", debug)
             .arg("--target-dir")
-            .arg(&target_dir)
-            .current_dir(root().join("boards").join(self.package))
-            .output()?;
+            .arg(target_dir)
+            .current_dir(&folder)
+            .output()
+            .with_context(|| format!("cargo could not be started in {}", folder.display()))?;
         if !output.status.success() {
             bail!(
-                "boards/{}: {program} does not build:\n{}",
+                "boards/{}: {program} does not build (`./test setup` adds the targets):\n{}",
                 self.package,
                 String::from_utf8_lossy(&output.stderr)
             );

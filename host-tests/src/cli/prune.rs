@@ -5,18 +5,12 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use beamfix::grid::{Grid, occupancy};
-use beamfix::slam::SlamConfig;
 use host_tests::formats::{self, Log};
-use host_tests::mapping::{self, Map, Pruning, Settings, Tier};
-use host_tests::pipeline::config;
+use host_tests::mapping::{self, Map, Pruning, Settings};
 use host_tests::report::relations::{self, Errors};
-use host_tests::size;
 use serde_json::json;
 
 use super::output;
-
-/// Cells of the maps (m).
-const RESOLUTION: f32 = 0.05;
 
 /// Compare what pruning to half of the keyframes costs: by information, every second one, random ones.
 ///
@@ -113,15 +107,7 @@ fn lost(whole: &Map, pruned: &Map) -> f64 {
 
 /// A map, and the errors of its poses.
 fn mapped(log: &Log, relations: &Path, pruning: Option<(usize, Pruning)>) -> Result<(Errors, Map)> {
-    let directions = size::fitting(log.scans.iter().map(|scan| &scan.beams[..]));
-    let settings = Settings {
-        tier: Tier::Of512k,
-        odometry: config(log.mount, directions),
-        slam: SlamConfig::DEFAULT,
-        scans: (log.scans.len(), true),
-        pruning,
-        resolution: Some(RESOLUTION),
-    };
+    let settings = Settings::of_all(log, pruning);
     let map = mapping::run(log, &settings, &mut || {})?;
     let poses: Vec<_> = map
         .scans
