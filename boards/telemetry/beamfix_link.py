@@ -20,14 +20,14 @@ import json
 import struct
 import sys
 
-VERSION = 6
+VERSION = 7
 
 VERDICTS = [
     "Measured", "Keyframe", "First", "TooFewBeams", "TooFewLines", "TooFewCorrespondences", "Degenerate", "NotConverged",
     "Ambiguous", "TooFar", "Refused", "NothingFound", "Unlikely", "BadGuess", "BadConfig",
     "Doubtful", "Searching", "Choosing",
 ]
-RESETS = ["Power", "Watchdog", "Other"]
+RESETS = ["Power", "Watchdog", "Other", "Asked"]
 LIDAR_STATES = ["Unknown", "Silent", "Noise", "Standing", "Turning", "Blind", "Starting", "Defective"]
 TASKS = ["Odometry", "Localization"]
 MOTOR_STATES = ["Free", "SpinningUp", "Steady", "Off"]
@@ -259,6 +259,11 @@ def gyro(rate):
 def start_at(x, y, theta):
     """The command that tells where the robot is in the map: m, m, rad."""
     return frame(b"\6" + struct.pack("<fff", x, y, theta))
+
+
+def ask_ready():
+    """The command that asks for Ready, for who comes after the board's start; boards before version 7 do not answer."""
+    return frame(b"\7")
 
 
 def main(arguments):

@@ -8,7 +8,7 @@ use beamfix::{
 };
 use beamfix_app::{
     link::{Counters, Receiver},
-    telemetry::{Health, Quality, Ready, Telemetry},
+    telemetry::{Health, Quality, Ready, Reset, Telemetry},
 };
 
 use crate::decode::Unwrapped;
@@ -133,11 +133,13 @@ impl<W: Write> Watch<W> {
     fn take(&mut self, message: Telemetry) -> io::Result<()> {
         match message {
             Telemetry::Ready(ready) => {
-                self.starts += 1;
+                if ready.reset != Reset::Asked {
+                    self.starts += 1;
+                    // It starts from the origin again, and so may its clock.
+                    self.pose = None;
+                    self.pose_clock = Unwrapped::default();
+                }
                 self.ready = Some(ready);
-                // It starts from the origin again, and so may its clock.
-                self.pose = None;
-                self.pose_clock = Unwrapped::default();
             }
             Telemetry::Pose(pose) => {
                 if let Some(last) = &self.pose {

@@ -107,6 +107,13 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
     /// The frame to send once the board listens.
     pub fn ready(&mut self, reset: Reset) -> &[u8] {
         self.report.out.clear();
+        self.send_ready(reset);
+        &self.report.out
+    }
+
+    /// Apart, so that its memory is not on the stack of whoever takes commands.
+    #[inline(never)]
+    fn send_ready(&mut self, reset: Reset) {
         let ready = Ready {
             version: VERSION,
             beams: N as u16,
@@ -116,7 +123,6 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
             task: E::KIND,
         };
         self.report.send(&Telemetry::Ready(ready));
-        &self.report.out
     }
 
     /// Bytes that report the error of the last pose; empty if there was no new pose or nobody knows the true one.
@@ -267,6 +273,11 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
                     // What is left of a recording comes too.
                     self.end_piece();
                     self.report.health_due = true;
+                }
+            }
+            Some(Command::Ready) => {
+                if self.report.may_answer() {
+                    self.send_ready(Reset::Asked);
                 }
             }
             Some(Command::StartAt { x, y, theta }) => {

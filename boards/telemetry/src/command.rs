@@ -55,6 +55,8 @@ pub enum Command<'a> {
         /// Heading (rad).
         theta: f32,
     },
+    /// Asks for [`Ready`](crate::telemetry::Ready), for who comes after the board's start.
+    Ready,
 }
 
 /// A beam as it is sent: `u16` bearing, `u16` range (mm, 0 for none), `u32` time (µs), `u8` quality, little endian.

@@ -25,7 +25,7 @@ pub const NAME: usize = 24;
 /// A message from the board. Whether a match was good stands in its pose; how good, in all numbers, in its quality.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Telemetry {
-    /// Sent once, when bytes are listened for.
+    /// Sent when bytes are listened for, and on request.
     Ready(Ready),
     /// After every revolution.
     Pose(Pose),
@@ -104,7 +104,7 @@ impl Mounted {
     }
 }
 
-/// Why a board has started.
+/// Why a board has started, or that it was only asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reset {
     /// It was switched on, or its supply broke down.
@@ -113,6 +113,8 @@ pub enum Reset {
     Watchdog,
     /// By a pin, a debugger, or for a reason that the board cannot tell.
     Other,
+    /// It has not started: it was asked what it is.
+    Asked,
 }
 
 /// Where the robot is, and how well that is known.

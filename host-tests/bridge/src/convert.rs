@@ -6,7 +6,7 @@ use beamfix::geometry::{Pose, Twist};
 use beamfix::lidar::Model;
 use beamfix::scan::Mount;
 use beamfix_app::link::Receiver;
-use beamfix_app::telemetry::{self, Health, LidarState, Ready, Task, Telemetry, Verdict};
+use beamfix_app::telemetry::{self, Health, LidarState, Ready, Reset, Task, Telemetry, Verdict};
 use host_tests::report::ros::message::{
     Diagnostics, Estimate, LaserScan, Odometry, Status, Time, Transform,
 };
@@ -41,6 +41,8 @@ pub struct Converter {
     wheels: VecDeque<(i64, Pose)>,
     /// Level and text that were told last.
     told: Option<(u8, String)>,
+    /// The board has told what it is.
+    pub is_known: bool,
     /// Starts of the board that were heard.
     pub starts: u32,
     /// Poses so far.
@@ -74,6 +76,7 @@ impl Converter {
             is_fresh: false,
             wheels: VecDeque::new(),
             told: None,
+            is_known: false,
             starts: 0,
             poses: 0,
             missing: 0,
@@ -124,16 +127,19 @@ impl Converter {
     }
 
     fn ready(&mut self, ready: &Ready, now_ns: i64) -> Message {
-        self.starts += 1;
+        self.is_known = true;
         self.task = ready.task;
         self.model = Model::ALL
             .iter()
             .find(|model| model.name == ready.lidar.as_str());
         self.lidar = ready.lidar.as_str().to_owned();
-        // It starts from its origin, and so may its lidar's clock.
-        (self.last, self.period, self.is_fresh) = (None, None, false);
-        self.clock = Clock::default();
-        self.sweep.interrupt();
+        if ready.reset != Reset::Asked {
+            self.starts += 1;
+            // It starts from its origin, and so may its lidar's clock.
+            (self.last, self.period, self.is_fresh) = (None, None, false);
+            self.clock = Clock::default();
+            self.sweep.interrupt();
+        }
         Message::Mount(mount(ready.mount.mount(), now_ns))
     }
 

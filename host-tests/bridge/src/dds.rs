@@ -13,23 +13,30 @@ use rustdds::no_key::{DeserializerAdapter, SerializerAdapter};
 use rustdds::policy::{Durability, History, Reliability};
 use rustdds::{
     DomainParticipant, DomainParticipantBuilder, Publisher, QosPolicies, QosPolicyBuilder,
-    RepresentationIdentifier, Subscriber, Timestamp, TopicKind,
+    RTPSEntity, RepresentationIdentifier, Subscriber, Timestamp, TopicKind,
 };
 
 use crate::message::{Delivery, Message, TOPICS, dds_topic, dds_type};
+use crate::node::{self, Ids, Participant};
 
-/// Which topics are not called as usual.
+/// What is not called as usual.
 pub struct Names<'a> {
     /// Of the board's odometry.
     pub odom: &'a str,
     /// Of the wheels'.
     pub wheels: &'a str,
+    /// Of the node.
+    pub node: &'a str,
+    /// How long ids are on ROS 2's wire.
+    pub ids: Ids,
 }
 
 /// Writers of all topics, and the reader of the wheels.
 pub struct Ros {
     writers: Vec<DataWriter<Vec<u8>, Cdr>>,
     wheels: DataReader<Vec<u8>, Cdr>,
+    // Keeps what it said for who comes later.
+    _node: DataWriter<Vec<u8>, Cdr>,
     // Behind what lives in them.
     _publisher: Publisher,
     _subscriber: Subscriber,
@@ -71,9 +78,30 @@ impl Ros {
             TopicKind::NoKey,
         )?;
         let wheels = subscriber.create_datareader_no_key(&topic, Some(quality))?;
+        let quality = self::quality(Delivery::Latched);
+        let topic = participant.create_topic(
+            node::TOPIC.to_owned(),
+            dds_type(node::KIND),
+            &quality,
+            TopicKind::NoKey,
+        )?;
+        let node: DataWriter<Vec<u8>, Cdr> =
+            publisher.create_datawriter_no_key(&topic, Some(quality))?;
+        let told = Participant {
+            id: participant.guid().to_bytes(),
+            node: names.node,
+            readers: &[wheels.guid().to_bytes()],
+            writers: &writers
+                .iter()
+                .map(|writer| writer.guid().to_bytes())
+                .collect::<Vec<_>>(),
+        };
+        node.write(told.cdr(names.ids)?, Some(Timestamp::now()))
+            .map_err(|error| anyhow!("{}: {error}", node::TOPIC))?;
         Ok(Self {
             writers,
             wheels,
+            _node: node,
             _publisher: publisher,
             _subscriber: subscriber,
             _participant: participant,

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! board ─▶ convert ─▶ message ─▶ dds ─▶ /odom /tf /tf_static /scan /diagnostics; in a map /pose, /map
+//!                             node ─▶ dds ─▶ ros_discovery_info
 //! board ◀──────────── wheels ◀── dds ◀─ /wheel_odom
 //! ```
 //!
@@ -11,4 +12,5 @@ pub mod clock;
 pub mod convert;
 pub mod dds;
 pub mod message;
+pub mod node;
 pub mod sweep;

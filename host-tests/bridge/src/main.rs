@@ -14,6 +14,7 @@ use beamfix_app::telemetry::Task;
 use beamfix_bridge::convert::{Converter, mount, time};
 use beamfix_bridge::dds::{Names, Ros};
 use beamfix_bridge::message::Message;
+use beamfix_bridge::node::{self, Ids};
 use clap::{Parser, ValueEnum};
 use host_tests::board::commands::Commands;
 use host_tests::formats::{mount, ros_map};
@@ -34,10 +35,13 @@ struct Args {
     /// Topic of the board's odometry.
     #[arg(long, value_name = "TOPIC", default_value = "/odom")]
     odom: String,
-    /// How the lidar sits on the robot, where the board is not heard starting.
+    /// Name of the node, as `ros2 node list` shows it.
+    #[arg(long, value_name = "NAME", default_value = "beamfix")]
+    node: String,
+    /// How the lidar sits on the robot, until the board tells it: only one before version 7 that is not heard starting does not.
     #[arg(long, value_name = "X,Y,DEG[,down]", value_parser = mount::parse, allow_hyphen_values = true)]
     mount: Option<Mount>,
-    /// What the board does, where it is not heard starting.
+    /// What the board does, until the board tells it.
     #[arg(long, value_enum, default_value_t = Doing::Odometry)]
     task: Doing,
     /// A map as ROS has it, published on /map.
@@ -51,6 +55,10 @@ enum Doing {
     Localization,
 }
 
+/// What the board has not answered after so long is asked again, [`QUESTIONS`] times in all: a board before version 7 does not
+/// know the question.
+const PATIENCE: Duration = Duration::from_secs(2);
+const QUESTIONS: u32 = 5;
 /// Nothing comes for so long where something is wrong: four revolutions of the slowest lidar.
 const SILENCE: Duration = Duration::from_secs(2);
 
@@ -68,6 +76,7 @@ fn run(args: &Args) -> Result<Infallible> {
         "--odom and --wheels are the same topic, {}: the board would be told what it has said",
         args.odom
     );
+    node::check(&args.node).context("--node")?;
     let map = args.map.as_deref().map(ros_map::read).transpose()?;
     let mut port = serialport::new(&args.port, args.baud)
         .timeout(Duration::from_millis(10))
@@ -82,6 +91,8 @@ fn run(args: &Args) -> Result<Infallible> {
     let names = Names {
         odom: &args.odom,
         wheels: &args.wheels,
+        node: &args.node,
+        ids: Ids::of(&env::var("ROS_DISTRO").unwrap_or_default()),
     };
     let mut ros = Ros::join(domain, is_local, &names)?;
     let mut converter = Converter::new(match args.task {
@@ -91,15 +102,13 @@ fn run(args: &Args) -> Result<Infallible> {
     if let Some(map) = &map {
         ros.publish(&Message::Map(occupied(map, time(now_ns()))))?;
     }
-    match args.mount {
-        Some(told) => ros.publish(&Message::Mount(mount(told, now_ns())))?,
-        None => eprintln!(
-            "no transform of the lidar on /tf_static before the board starts and tells it, or --mount does"
-        ),
+    if let Some(told) = args.mount {
+        ros.publish(&Message::Mount(mount(told, now_ns())))?;
     }
-    eprintln!("{}: domain {domain}", args.port);
+    eprintln!("{}: domain {domain}, node /{}", args.port, args.node);
     ask(&mut port)?;
     let (mut heard, mut starts) = (Instant::now(), 0);
+    let (mut asked, mut questions) = (Instant::now(), 1);
     let mut bytes = [0; 4096];
     loop {
         let count = match port.read(&mut bytes) {
@@ -123,6 +132,14 @@ fn run(args: &Args) -> Result<Infallible> {
         if converter.starts != starts {
             starts = converter.starts;
             ask(&mut port)?;
+        } else if !converter.is_known && questions < QUESTIONS && asked.elapsed() > PATIENCE {
+            (asked, questions) = (Instant::now(), questions + 1);
+            ask(&mut port)?;
+            if questions == QUESTIONS && args.mount.is_none() {
+                eprintln!(
+                    "the board does not tell how its lidar sits: no transform of it on /tf_static before the board starts again, or --mount tells it"
+                );
+            }
         }
         wheels(&mut ros, &mut converter, &mut port)?;
     }
@@ -147,7 +164,7 @@ fn wheels(ros: &mut Ros, converter: &mut Converter, port: &mut impl Write) -> Re
     }
 }
 
-/// Asks the board for its beams and for how it is.
+/// Asks the board for its beams, what it is and how it is.
 fn ask(port: &mut impl Write) -> Result<()> {
     let mut commands = Commands::new();
     commands.send(&Command::Send {
@@ -155,6 +172,7 @@ fn ask(port: &mut impl Write) -> Result<()> {
         scans: true,
         quality: false,
     });
+    commands.ask_ready();
     commands.ask_health();
     Ok(port.write_all(commands.bytes())?)
 }

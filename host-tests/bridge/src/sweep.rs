@@ -2,12 +2,16 @@
 //!
 //! Bearings rise, as most of ROS's readers want them. A lidar that turns clockwise measures them from the last to the first:
 //! the stamp is then the end of the revolution, when the array's first beam was measured, and the time from one beam to the
-//! next is negative. The array is as long for every revolution: readers keep the length of the first.
+//! next is negative. The array is as long for every revolution, for readers keep the length of the first: as long as a turn at
+//! the first revolution's distance from beam to beam, whatever was lost of it.
 
 use beamfix_app::telemetry::Piece;
 
 /// Bearings of a turn.
 const TURN: i64 = 65_536;
+
+/// A step so many times as long as the middle one is a gap: fewer beams are in no packet.
+const GAP: i64 = 4;
 
 /// What the beams of a revolution are sorted into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,6 +71,10 @@ impl Sweep {
     }
 
     fn sorted(&mut self, beams: &[(u16, u16)]) -> Option<Array> {
+        // The start of the second of two was lost.
+        if steps(beams).sum::<i64>().abs() > TURN * 3 / 2 {
+            return None;
+        }
         let grid = match self.grid {
             Some(grid) => grid,
             None => *self.grid.insert(Grid::of(beams)?),
@@ -110,14 +118,22 @@ impl Grid {
         let [(start, _), _, _, ..] = beams else {
             return None;
         };
-        let steps = beams.windows(2).map(|pair| match pair {
-            [(one, _), (next, _)] => i64::from(next.wrapping_sub(*one) as i16),
-            _ => 0,
-        });
+        let is_clockwise = steps(beams).sum::<i64>() < 0;
+        let along = |step: i64| if is_clockwise { -step } else { step };
+        let mut sorted: Vec<i64> = steps(beams).map(along).collect();
+        sorted.sort_unstable();
+        let longest = GAP * sorted[sorted.len() / 2].max(1);
+        let usual = sorted.partition_point(|&step| step <= longest);
+        let turned: i64 = sorted[..usual].iter().sum();
+        // At most a beam for each bearing; rounded.
+        let count = match turned {
+            1.. => (TURN * usual as i64 + turned / 2) / turned,
+            _ => beams.len() as i64,
+        };
         Some(Self {
             start: *start,
-            count: beams.len(),
-            is_clockwise: steps.sum::<i64>() < 0,
+            count: count.clamp(1, TURN) as usize,
+            is_clockwise,
         })
     }
 
@@ -137,6 +153,14 @@ impl Grid {
         };
         index as usize
     }
+}
+
+/// From each bearing to the next, the shorter way (1/65 536 turn).
+fn steps(beams: &[(u16, u16)]) -> impl Iterator<Item = i64> + '_ {
+    beams.windows(2).map(|pair| match pair {
+        [(one, _), (next, _)] => i64::from(next.wrapping_sub(*one) as i16),
+        _ => 0,
+    })
 }
 
 #[cfg(test)]
@@ -224,17 +248,70 @@ mod tests {
     #[test]
     fn a_revolution_that_was_not_heard_from_its_start_is_left_out() {
         let mut sweep = Sweep::default();
-        let piece = |turn_start| Piece {
+        let piece = |turn_start, first: u16, step: u16| Piece {
             turn_start,
-            first: 0,
-            last: 30_000,
+            first,
+            last: first.wrapping_add(11 * step),
             ranges_mm: [1000; 12].into_iter().collect(),
         };
-        assert_eq!(sweep.push(&piece(None)), None);
-        assert_eq!(sweep.push(&piece(Some(3))), None);
-        // Nine beams of the last piece and four of this one.
-        let array = sweep.push(&piece(Some(4))).expect("a revolution");
-        assert_eq!(array.ranges.len(), 13);
+        // A third of a turn each.
+        let step = 1820;
+        assert_eq!(sweep.push(&piece(None, 0, step)), None);
+        assert_eq!(sweep.push(&piece(Some(3), 12 * step, step)), None);
+        assert_eq!(sweep.push(&piece(None, 24 * step, step)), None);
+        assert_eq!(sweep.push(&piece(None, 0, step)), None);
+        // Nine beams, two pieces and four beams of this one.
+        let array = sweep.push(&piece(Some(4), 12 * step, step));
+        assert_eq!(array.expect("a revolution").ranges.len(), 36);
+    }
+
+    /// Revolutions of 30 pieces of 12 beams, 1 m away, of which these are lost.
+    fn without(lost: &[usize], clockwise: bool) -> Vec<Array> {
+        let mut sweep = Sweep::default();
+        let mut arrays = Vec::new();
+        for k in (0..30 * 4 + 1).filter(|k| !lost.contains(k)) {
+            let at = |beam: usize| {
+                let along = (beam * 65_536 / 360) as u16;
+                if clockwise {
+                    along.wrapping_neg()
+                } else {
+                    along
+                }
+            };
+            arrays.extend(sweep.push(&Piece {
+                turn_start: k.is_multiple_of(30).then_some(0),
+                first: at(12 * k),
+                last: at(12 * k + 11),
+                ranges_mm: [1000; 12].into_iter().collect(),
+            }));
+        }
+        arrays
+    }
+
+    #[test]
+    fn pieces_lost_of_the_first_revolution_do_not_shorten_the_array() {
+        for clockwise in [true, false] {
+            let arrays = without(&[3, 4, 17], clockwise);
+            assert_eq!(arrays.len(), 4);
+            for (array, missing) in arrays.iter().zip([36, 0, 0, 0]) {
+                assert_eq!(array.ranges.len(), 360);
+                let unmeasured = array.ranges.iter().filter(|range| range.is_nan());
+                assert_eq!(unmeasured.count(), missing, "{clockwise}");
+            }
+        }
+    }
+
+    #[test]
+    fn two_revolutions_without_a_start_between_them_are_no_array() {
+        // The second revolution's start is lost.
+        let arrays = without(&[30], true);
+        assert_eq!(arrays.len(), 2);
+        assert!(arrays.iter().all(|array| array.ranges.len() == 360));
+        assert!(
+            arrays
+                .iter()
+                .all(|array| array.ranges.iter().all(|range| !range.is_nan()))
+        );
     }
 
     #[test]

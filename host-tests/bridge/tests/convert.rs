@@ -39,7 +39,7 @@ fn say(converter: &mut Converter, k: u16, message: &Telemetry) -> Vec<Message> {
 
 fn ready(task: Task) -> Telemetry {
     Telemetry::Ready(Ready {
-        version: 6,
+        version: beamfix_app::VERSION,
         beams: 456,
         reset: Reset::Power,
         mount: Mounted {
@@ -48,6 +48,17 @@ fn ready(task: Task) -> Telemetry {
         },
         lidar: "ld06".parse().expect("short"),
         task,
+    })
+}
+
+/// The answer to the question what it is.
+fn asked(task: Task) -> Telemetry {
+    let Telemetry::Ready(ready) = ready(task) else {
+        unreachable!();
+    };
+    Telemetry::Ready(Ready {
+        reset: Reset::Asked,
+        ..ready
     })
 }
 
@@ -174,6 +185,29 @@ fn a_refused_pose_is_told_and_an_unknown_one_is_no_pose() {
         &pose(1, [f32::NAN, 0.0, 0.0], Verdict::Measured),
     );
     assert!(messages.is_empty(), "{messages:?}");
+}
+
+#[test]
+fn a_board_that_answers_what_it_is_goes_on_and_one_that_starts_begins_anew() {
+    let mut converter = Converter::new(Task::Odometry);
+    say(&mut converter, 0, &pose(0, [0.0; 3], Verdict::First));
+    assert!(!converter.is_known);
+    let messages = say(&mut converter, 0, &asked(Task::Localization));
+    assert!(matches!(&messages[..], [Message::Mount(_)]), "{messages:?}");
+    assert_eq!((converter.is_known, converter.starts), (true, 0));
+    // The numbers go on, so that what is lost is seen; and the pose is one in the map.
+    let messages = say(&mut converter, 3, &pose(3, [0.0; 3], Verdict::Measured));
+    assert!(
+        messages
+            .iter()
+            .any(|message| matches!(message, Message::Pose(_))),
+        "{messages:?}"
+    );
+    assert_eq!(converter.missing, 2);
+    say(&mut converter, 4, &ready(Task::Odometry));
+    assert_eq!(converter.starts, 1);
+    say(&mut converter, 9, &pose(9, [0.0; 3], Verdict::Measured));
+    assert_eq!(converter.missing, 2);
 }
 
 #[test]

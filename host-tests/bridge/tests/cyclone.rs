@@ -53,20 +53,35 @@ impl Drop for Ended {
     }
 }
 
+/// Whether the board starts before the bridge or after.
+#[derive(Clone, Copy, PartialEq)]
+enum Starts {
+    Before,
+    After,
+}
+
 /// The firmware at the other end of the line, in its own time, until `done`; gives what it said and what it was sent.
-fn board(mut line: TTYPort, drive: &Drive, mut done: impl FnMut() -> bool) -> (Vec<u8>, Vec<u8>) {
+fn board(
+    mut line: TTYPort,
+    starts: Starts,
+    drive: &Drive,
+    mut done: impl FnMut() -> bool,
+) -> (Vec<u8>, Vec<u8>) {
     let mut config = CONFIG;
     config.odometry.points.mount.robot_from_lidar = MOUNT;
     let mut app = Box::new(App::<BEAMS>::new(config));
     line.set_timeout(Duration::from_millis(1)).expect("a line");
-    // It starts once the bridge listens, whose first question it does not hear.
+    let (mut said, mut got) = (Vec::new(), Vec::new());
     let mut bytes = [0; 256];
-    let given_up = Instant::now() + Duration::from_secs(60);
-    while line.read(&mut bytes).is_err() {
-        assert!(Instant::now() < given_up, "the bridge asks nothing");
+    if starts == Starts::After {
+        // It does not hear the bridge's first question.
+        let given_up = Instant::now() + Duration::from_secs(60);
+        while line.read(&mut bytes).is_err() {
+            assert!(Instant::now() < given_up, "the bridge asks nothing");
+        }
+        said.extend_from_slice(app.ready(Reset::Power));
     }
     let start = Instant::now();
-    let (mut said, mut got) = (app.ready(Reset::Power).to_vec(), Vec::new());
     let (mut sent, mut frame, mut written) = (0, 0, 0);
     while !done() {
         let now_us = start.elapsed().as_micros();
@@ -140,11 +155,18 @@ fn truth(drive: &Drive, time: f64) -> TruePose {
     drive.moments[k.min(drive.moments.len() - 1)].truth
 }
 
-#[test]
-fn cyclone_dds_receives_what_the_board_said_and_its_wheels_reach_the_board() {
-    let Some(python) = python() else {
-        return;
-    };
+/// What a board said and was sent, and what Cyclone DDS got of it through the bridge within so many seconds.
+struct Run {
+    drive: Drive,
+    map: ros_map::Map,
+    said: Vec<u8>,
+    got: Vec<u8>,
+    received: Value,
+}
+
+/// With a bridge for nodes of this distribution; `None` where there is no Cyclone DDS.
+fn run(starts: Starts, listens: f64, distribution: &str) -> Option<Run> {
+    let python = python()?;
     let settings = Settings {
         seconds: 40.0,
         ..Settings::DEFAULT
@@ -154,23 +176,33 @@ fn cyclone_dds_receives_what_the_board_said_and_its_wheels_reach_the_board() {
     let start = truth(&drive, 0.0);
     let map = ros_map::of_world(&drive.world, low, high, 0.05, [start.x, start.y]);
     let map = map.expect("a map");
-    let yaml = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bridge.yaml");
+    let yaml = format!("bridge-{distribution}.yaml");
+    let yaml = Path::new(env!("CARGO_TARGET_TMPDIR")).join(yaml);
     ros_map::write(&map, &yaml).expect("the test's file");
 
     let (master, slave) = TTYPort::pair().expect("a pseudo-terminal");
     // Others on this machine may test too.
-    let domain = (20 + std::process::id() % 80).to_string();
+    let first = match starts {
+        Starts::Before => 20,
+        Starts::After => 60,
+    };
+    let domain = (first + std::process::id() % 40).to_string();
     let bridge = Command::new(env!("CARGO_BIN_EXE_beamfix-bridge"))
         .arg(slave.name().expect("its name"))
         .args(["--map", yaml.to_str().expect("a name")])
         .env("ROS_DOMAIN_ID", &domain)
         .env("ROS_LOCALHOST_ONLY", "1")
+        .env("ROS_DISTRO", distribution)
         .spawn()
         .expect("the bridge");
     let _bridge = Ended(bridge);
+    let bytes = match distribution {
+        "humble" => "24",
+        _ => "16",
+    };
     let peer = Command::new(&python)
         .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peer.py"))
-        .args([&domain, &LISTENS.to_string()])
+        .args([&domain, &listens.to_string(), bytes])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -187,7 +219,7 @@ fn cyclone_dds_receives_what_the_board_said_and_its_wheels_reach_the_board() {
     });
     // What was sent last is still on its way.
     let mut end = None;
-    let (said, got) = board(master, &drive, || {
+    let (said, got) = board(master, starts, &drive, || {
         reader.is_finished()
             && end.get_or_insert_with(Instant::now).elapsed() > Duration::from_secs(2)
     });
@@ -195,7 +227,124 @@ fn cyclone_dds_receives_what_the_board_said_and_its_wheels_reach_the_board() {
     errors.read_to_string(&mut rest).expect("text");
     let text = reader.join().expect("what was received");
     let received: Value = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{first}{rest}"));
-    check(&received, &poses(&said), &got, &drive, &map);
+    Some(Run {
+        drive,
+        map,
+        said,
+        got,
+        received,
+    })
+}
+
+#[test]
+fn cyclone_dds_receives_what_the_board_said_and_its_wheels_reach_the_board() {
+    let Some(run) = run(Starts::After, LISTENS, "jazzy") else {
+        return;
+    };
+    check(
+        &run.received,
+        &poses(&run.said),
+        &run.got,
+        &run.drive,
+        &run.map,
+    );
+    is_node(&run.received, 16);
+}
+
+#[test]
+fn a_bridge_that_starts_after_the_board_asks_what_it_is() {
+    let Some(run) = run(Starts::Before, 5.0, "humble") else {
+        return;
+    };
+    is_at_mount(&run.received);
+    let list = |name: &str| run.received["received"][name].as_array().expect("a list");
+    assert!(list("/odom").len() > 20 && list("/scan").len() > 20);
+    // The board answered, and has not started.
+    let mut receiver = Receiver::new();
+    let resets: Vec<Reset> = (run.said.iter())
+        .filter_map(|&byte| match receiver.push(byte) {
+            Some(Telemetry::Ready(ready)) => Some(ready.reset),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(resets, [Reset::Asked]);
+    is_node(&run.received, 24);
+}
+
+/// The bridge is a node whose writers and readers are those that DDS's discovery tells, with ids of so many bytes.
+fn is_node(received: &Value, bytes: usize) {
+    let list = |value: &Value| value.as_array().expect("a list").clone();
+    let infos = list(&received["received"]["ros_discovery_info"]);
+    let [info] = &infos[..] else {
+        panic!("one participant: {infos:?}");
+    };
+    let hex = |gid: &Value| -> String {
+        let data = list(&gid["data"]);
+        assert_eq!(data.len(), bytes);
+        assert!(data[16..].iter().all(|byte| byte == 0), "{gid}");
+        let digits = data[..16]
+            .iter()
+            .map(|byte| format!("{:02x}", byte.as_u64().expect("a byte")));
+        digits.collect()
+    };
+    let nodes = list(&info["node_entities_info_seq"]);
+    let [node] = &nodes[..] else {
+        panic!("one node: {info}");
+    };
+    assert_eq!(
+        (&node["node_namespace"], &node["node_name"]),
+        (&"/".into(), &"beamfix".into())
+    );
+    // Topics of the ids, by what DDS tells of the participant.
+    let participant = hex(&info["gid"]);
+    let topics = |kind: &str, ids: &Value| -> Vec<String> {
+        let found = list(&received["found"][kind]);
+        let mut topics: Vec<String> = list(ids)
+            .iter()
+            .map(|id| {
+                let id = hex(id);
+                let endpoint = found.iter().find(|endpoint| endpoint[0] == id.as_str());
+                let endpoint = endpoint.unwrap_or_else(|| panic!("{id} in {found:?}"));
+                assert_eq!(endpoint[1], participant.as_str());
+                endpoint[2].as_str().expect("a name").to_owned()
+            })
+            .collect();
+        topics.sort_unstable();
+        topics
+    };
+    assert_eq!(
+        topics("writers", &node["writer_gid_seq"]),
+        [
+            "rt/diagnostics",
+            "rt/map",
+            "rt/odom",
+            "rt/pose",
+            "rt/scan",
+            "rt/tf",
+            "rt/tf_static"
+        ]
+    );
+    assert_eq!(
+        topics("readers", &node["reader_gid_seq"]),
+        ["rt/wheel_odom"]
+    );
+}
+
+/// The lidar sits where the board says.
+fn is_at_mount(received: &Value) {
+    let mounts = received["received"]["/tf_static"].as_array();
+    let mount = &mounts.expect("a list").last().expect("a mount")["transforms"][0];
+    assert_eq!(
+        (&mount["header"]["frame_id"], &mount["child_frame_id"]),
+        (&"base_link".into(), &"laser".into())
+    );
+    let place = &mount["transform"];
+    let mount = planar(&place["translation"], &place["rotation"]);
+    let told = [MOUNT.x, MOUNT.y, MOUNT.theta];
+    assert_eq!(
+        [mount.x, mount.y, mount.theta].map(|value| value as f32),
+        told
+    );
 }
 
 fn check(
@@ -312,19 +461,7 @@ fn check(
         same += 1;
     }
     assert!(10 * same > 9 * odom.len(), "{same} of {}", odom.len());
-    // The lidar sits where the board says.
-    let mount = &list("/tf_static").last().expect("a mount")["transforms"][0];
-    assert_eq!(
-        (&mount["header"]["frame_id"], &mount["child_frame_id"]),
-        (&"base_link".into(), &"laser".into())
-    );
-    let place = &mount["transform"];
-    let mount = planar(&place["translation"], &place["rotation"]);
-    let told = [MOUNT.x, MOUNT.y, MOUNT.theta];
-    assert_eq!(
-        [mount.x, mount.y, mount.theta].map(|value| value as f32),
-        told
-    );
+    is_at_mount(received);
     // Scans: each beam ends at a wall, from where the lidar was when it was measured.
     let scans = list("/scan");
     assert!(scans.len() > 40, "{} scans", scans.len());

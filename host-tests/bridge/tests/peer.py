@@ -1,7 +1,8 @@
 """What Cyclone DDS, an implementation of its own, receives from the bridge, as one object of JSON; it sends the wheels' poses.
 
-    peer.py DOMAIN SECONDS
+    peer.py DOMAIN SECONDS BYTES
 
+BYTES is how long ids are on ROS 2's wire: 16, until Humble 24.
 Types and topics are written as ROS 2's interface packages define them and as its middleware mangles their names.
 """
 
@@ -17,10 +18,11 @@ CONFIGURATION = """<CycloneDDS><Domain>
   <Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="localhost"/></Peers></Discovery>
 </Domain></CycloneDDS>"""
 
+from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, byte, float32, float64, int8, int32, sequence, uint32
+from cyclonedds.idl.types import array, byte, float32, float64, int8, int32, sequence, uint8, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -161,6 +163,25 @@ class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::Diagnosti
     status: sequence[DiagnosticStatus]
 
 
+@dataclass
+class Gid(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
+    data: array[uint8, int(sys.argv[3])]
+
+
+@dataclass
+class NodeEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::NodeEntitiesInfo_"):
+    node_namespace: str
+    node_name: str
+    reader_gid_seq: sequence[Gid]
+    writer_gid_seq: sequence[Gid]
+
+
+@dataclass
+class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"):
+    gid: Gid
+    node_entities_info_seq: sequence[NodeEntitiesInfo]
+
+
 RELIABLE = Policy.Reliability.Reliable(duration(seconds=1))
 # As nav2, tf2, RViz's sensor profile and the map's readers ask for them.
 ASKED = {
@@ -174,11 +195,15 @@ ASKED = {
 }
 
 
+# As ROS 2's middleware reads it.
+GRAPH = Qos(RELIABLE, Policy.Durability.TransientLocal, Policy.History.KeepAll)
+
+
 def plain(value):
     """Fields by name; what JSON has no number for by its name."""
     if isinstance(value, IdlStruct):
         return {name: plain(field) for name, field in vars(value).items() if name != "sample_info"}
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, (list, tuple, bytes)):
         return [plain(one) for one in value]
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
@@ -193,6 +218,11 @@ def main():
         name: DataReader(participant, Topic(participant, "rt" + name, kind), qos=quality)
         for name, (kind, quality) in ASKED.items()
     }
+    readers["ros_discovery_info"] = DataReader(participant, Topic(participant, "ros_discovery_info", ParticipantEntitiesInfo), qos=GRAPH)
+    # What DDS's own discovery tells.
+    discovery = {"writers": BuiltinTopicDcpsPublication, "readers": BuiltinTopicDcpsSubscription}
+    discovery = {name: BuiltinDataReader(participant, topic) for name, topic in discovery.items()}
+    found = {name: [] for name in discovery}
     writer = DataWriter(
         participant,
         Topic(participant, "rt/wheel_odom", Odometry),
@@ -207,6 +237,10 @@ def main():
             for one in reader.take(100):
                 if one.sample_info.valid_data:
                     received[name].append({**plain(one), "source_ns": one.sample_info.source_timestamp})
+        for name, reader in discovery.items():
+            for one in reader.take(100):
+                if one.sample_info.valid_data:
+                    found[name].append([one.key.hex, one.participant_key.hex, one.topic_name, one.type_name])
         if time.time() >= next_wheels and writer.get_matched_subscriptions():
             next_wheels = time.time() + 0.1
             now, half = time.time(), -0.3
@@ -217,7 +251,7 @@ def main():
             writer.write(message)
             sent += 1
         time.sleep(0.01)
-    json.dump({"received": received, "sent": sent}, sys.stdout)
+    json.dump({"received": received, "found": found, "sent": sent}, sys.stdout)
 
 
 main()

@@ -46,6 +46,11 @@ impl Commands {
         self.push(&Command::Health);
     }
 
+    /// Asks what the board is; one before version 7 counts a damaged command.
+    pub fn ask_ready(&mut self) {
+        self.push(&Command::Ready);
+    }
+
     /// A whole scan. It is matched when the next one starts.
     pub fn scan(&mut self, beams: &[Beam]) {
         for (k, piece) in beams.chunks(command::BEAMS).enumerate() {

@@ -172,6 +172,7 @@ impl Live<'_> {
             scans: true,
             quality: true,
         });
+        asked.ask_ready();
         asked.ask_health();
         let _ = commands.write_all(asked.bytes());
     }

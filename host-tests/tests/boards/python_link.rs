@@ -57,6 +57,7 @@ fn messages() -> Vec<Telemetry> {
         (Reset::Power, false, Task::Odometry),
         (Reset::Watchdog, true, Task::Localization),
         (Reset::Other, false, Task::Odometry),
+        (Reset::Asked, false, Task::Odometry),
     ] {
         let mount = Mounted {
             pose: [0.1, -THIRD, 3.0],
@@ -233,7 +234,7 @@ fn the_firmware_understands_pythons_commands() {
     };
     let script = "import sys; sys.path.insert(0, sys.argv[1]); import beamfix_link as b; \
         sys.stdout.buffer.write(b.wheels(1.5, -0.25, 3.0) + b.lidar(bytes(range(94))) + b.ask_health() \
-        + b.send(raw=True, quality=True) + b.gyro(-0.5) + b.start_at(1.0, 2.0, -0.5))";
+        + b.send(raw=True, quality=True) + b.gyro(-0.5) + b.start_at(1.0, 2.0, -0.5) + b.ask_ready())";
     let folder = file.parent().expect("a folder");
     let output = python
         .args(["-c", script])
@@ -266,14 +267,15 @@ fn the_firmware_understands_pythons_commands() {
                 quality: true,
             },
             4 => Command::Gyro { rate: -0.5 },
-            _ => Command::StartAt {
+            5 => Command::StartAt {
                 x: 1.0,
                 y: 2.0,
                 theta: -0.5,
             },
+            _ => Command::Ready,
         };
         assert_eq!(command, wanted);
         got += 1;
     }
-    assert_eq!((got, receiver.counters().errors), (6, 0));
+    assert_eq!((got, receiver.counters().errors), (7, 0));
 }

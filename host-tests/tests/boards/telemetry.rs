@@ -9,11 +9,12 @@ use beamfix::{
 use beamfix_app::{
     AppConfig, BEAMS, CONFIG, link,
     telemetry::{
-        Found, HEALTH_FRAME, Health, POSE_FRAME, Pose, QUALITY_FRAME, Quality, Reset, Telemetry,
-        Verdict, Weak,
+        Found, HEALTH_FRAME, Health, POSE_FRAME, Pose, QUALITY_FRAME, Quality, Ready, Reset,
+        Telemetry, Verdict, Weak,
     },
 };
 use beamfix_sim::encoder::{Echo, Encoder as _, ld06::Sensor};
+use host_tests::board::commands::Commands;
 
 /// No zero byte in it.
 const WORST: f32 = f32::from_bits(0xbf9d_3f71);
@@ -124,6 +125,63 @@ fn pairs(messages: &[Telemetry]) -> Vec<(Pose, Quality)> {
         Some((*pose, *quality))
     });
     poses.collect()
+}
+
+#[test]
+fn frames_in_the_handbook_are_what_the_crate_makes() {
+    let page = include_str!("../../../docs/telemetry.md");
+    let has = |frame: &[u8]| {
+        let hex: Vec<String> = frame.iter().map(|byte| format!("{byte:02x}")).collect();
+        let words: Vec<&str> = page.split_whitespace().collect();
+        assert!(words.join(" ").contains(&hex.join(" ")), "{hex:?}");
+    };
+    let pose = Pose {
+        sequence: 300,
+        time_us: 2_987_673,
+        pose: [1.5, -0.25, 0.5],
+        covariance: [0.0625, 0.0, 0.0625, 0.0, 0.0, 0.03125],
+        verdict: Verdict::Measured,
+        inliers: 427,
+        beams: 450,
+        residual: 0.007_812_5,
+    };
+    let mut frame = heapless::Vec::<u8, 128>::new();
+    assert!(link::append(&Telemetry::Pose(pose), &mut frame));
+    has(&frame);
+    let mut wheels = Commands::new();
+    wheels.wheels(beamfix::geometry::Pose::new(1.5, -0.25, 0.5));
+    has(wheels.bytes());
+    assert!(page.contains(&format!("This page is version {}.", beamfix_app::VERSION)));
+}
+
+#[test]
+fn a_board_that_is_asked_what_it_is_answers_without_starting() {
+    let mut app = Box::new(beamfix_app::App::<BEAMS>::new(CONFIG));
+    let mut receiver = link::Receiver::new();
+    let mut ready = |sent: &[u8]| -> Vec<Ready> {
+        let messages = sent.iter().filter_map(|&byte| receiver.push(byte));
+        let ready = |message| match message {
+            Telemetry::Ready(ready) => Some(ready),
+            _ => None,
+        };
+        messages.filter_map(ready).collect()
+    };
+    let [started] = &ready(app.ready(Reset::Power))[..] else {
+        panic!("no start");
+    };
+    let mut questions = Commands::new();
+    for _ in 0..3 {
+        questions.ask_ready();
+    }
+    let mut sent = Vec::new();
+    app.command_all(questions.bytes(), |out| sent.extend_from_slice(out));
+    let answer = Ready {
+        reset: Reset::Asked,
+        ..started.clone()
+    };
+    // No more than two between two revolutions.
+    assert_eq!(ready(&sent), [answer.clone(), answer]);
+    assert_eq!(app.health().commands, 3);
 }
 
 #[test]
