@@ -1,6 +1,6 @@
 //! A lidar on a serial line, from its name or from nothing to a stream of measurements.
 
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
@@ -28,7 +28,29 @@ const HASTY: StartConfig = StartConfig {
 /// Opens a serial line.
 pub fn open(path: &str, baud: u32) -> Result<Box<dyn SerialPort>> {
     let port = serialport::new(path, baud).timeout(PATIENCE).open();
-    port.with_context(|| path.to_owned())
+    port.map_err(|error| {
+        let kind = io::Error::from(error.clone()).kind();
+        anyhow::Error::new(error).context(format!("{path}{}", advice(kind)))
+    })
+}
+
+/// What helps where a serial line does not open, after its name.
+#[must_use]
+pub fn advice(kind: io::ErrorKind) -> String {
+    match kind {
+        io::ErrorKind::NotFound => {
+            let ports = serialport::available_ports().unwrap_or_default();
+            let names: Vec<String> = ports.into_iter().map(|port| port.port_name).collect();
+            match names.is_empty() {
+                true => " (no serial line is there: is it plugged in?)".to_owned(),
+                false => format!(" (there are: {})", names.join(", ")),
+            }
+        }
+        io::ErrorKind::PermissionDenied => {
+            " (on Linux it is most often the group dialout's: sudo usermod -aG dialout $USER, and log in again)".to_owned()
+        }
+        _ => String::new(),
+    }
 }
 
 /// Starts the lidar called `name`, or finds out which it is for `auto`; `baud` where its line has another speed than

@@ -71,7 +71,7 @@ pub struct Log {
     pub lidar: Option<String>,
     /// Lines or frames left out because they are broken.
     pub skipped: usize,
-    /// The first of these and what is wrong with it.
+    /// What is wrong with the first of these, or with all.
     pub first_skipped: Option<String>,
     /// Readings that are no ranges: kept as beams without a return.
     pub odd: Odd,
@@ -118,7 +118,7 @@ impl Log {
     pub(crate) fn skip(&mut self, place: impl std::fmt::Display, why: impl std::fmt::Display) {
         self.skipped += 1;
         if self.first_skipped.is_none() {
-            self.first_skipped = Some(format!("{place}: {why}"));
+            self.first_skipped = Some(format!("the first at {place}: {why}"));
         }
     }
 
@@ -127,7 +127,7 @@ impl Log {
     pub fn remarks(&self) -> Option<String> {
         let mut parts = Vec::new();
         if let Some(first) = &self.first_skipped {
-            parts.push(format!("{} left out, the first at {first}", self.skipped));
+            parts.push(format!("{} left out: {first}", self.skipped));
         }
         if self.odd.bad > 0 {
             parts.push(format!(

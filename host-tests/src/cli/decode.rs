@@ -17,8 +17,8 @@ use super::output;
 /// Decode a raw capture into beams, as the sensor itself gives them.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The sensor that the bytes come from: a name that `lidars` lists, or `auto`.
-    #[arg(long, value_name = "MODEL")]
+    /// The sensor that the bytes come from: a name that `lidars` lists, or `auto`, found by the bytes.
+    #[arg(long, value_name = "MODEL", default_value = "auto")]
     lidar: String,
     /// The capture: the sensor's bytes, a recording of `simulate`, or what a board has sent; packed with gzip or not.
     file: PathBuf,

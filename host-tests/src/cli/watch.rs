@@ -13,6 +13,7 @@ use beamfix_app::command::Command;
 use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::ld06::Sensor;
 use host_tests::board::{Board, commands::Commands, stream::Stream};
+use host_tests::bringup;
 use host_tests::report::picture::{self, Kind};
 use host_tests::report::terminal::View;
 use host_tests::watch::Watch;
@@ -336,7 +337,14 @@ fn line(source: &str, baud: u32) -> Result<Line> {
         return Ok(Line::Serial(port));
     }
     // A pipe, or a terminal that is no serial line.
-    let file = File::open(source).with_context(|| source.to_owned())?;
+    let file = File::open(source).map_err(|error| {
+        let is_line = source.starts_with("/dev/tty") || source.to_uppercase().starts_with("COM");
+        let advice = match is_line {
+            true => bringup::advice(error.kind()),
+            false => String::new(),
+        };
+        anyhow::Error::new(error).context(format!("{source}{advice}"))
+    })?;
     Ok(Line::File(file))
 }
 

@@ -420,7 +420,7 @@ mod tests {
         assert_eq!((log.scans.len(), log.skipped, log.odd.bad), (1, 5, 2));
         let first = log.first_skipped.expect("one");
         assert!(
-            first.starts_with("line 1: reading 2: \"x\" is not a number"),
+            first.starts_with("the first at line 1: reading 2: \"x\" is not a number"),
             "{first}"
         );
     }
