@@ -27,10 +27,14 @@ const SAME_MOMENT: f64 = 5e-4;
 /// Errors of a trajectory over the relations of a file that are at most `longest` seconds apart.
 pub fn errors(mut track: Vec<Placed>, relations: &Path, longest: f64) -> Result<Errors> {
     track.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // The nearest: some scans are half a millisecond apart.
     let at = |time: f64| {
-        let k = track.partition_point(|placed| placed.0 < time - SAME_MOMENT);
-        let found = track.get(k).copied();
-        found.filter(|placed| (placed.0 - time).abs() <= SAME_MOMENT)
+        let k = track.partition_point(|placed| placed.0 < time);
+        let around = track.get(k.saturating_sub(1)..).unwrap_or_default();
+        let off = |placed: &Placed| (placed.0 - time).abs();
+        let near = around.iter().take(2).copied();
+        near.min_by(|a, b| off(a).total_cmp(&off(b)))
+            .filter(|placed| off(placed) <= SAME_MOMENT)
     };
     let name = || relations.display().to_string();
     let text = fs::read_to_string(relations).with_context(name)?;
@@ -74,5 +78,30 @@ pub fn placed(line: &str) -> Option<Placed> {
     match numbers[..] {
         [time, x, y, theta] => Some((time, TruePose::new(x, y, theta))),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_moment_is_that_of_the_nearest_scan() {
+        let file = std::env::temp_dir().join(format!("relations-{}", std::process::id()));
+        fs::write(&file, "1.0 2.0 1.0 0 0 0 0 0\n").expect("the test's file");
+        // One scan 0.4 ms before each moment, one 0.1 ms after.
+        let track = [
+            (0.9996, 0.5),
+            (1.0001, 0.0),
+            (1.9996, 7.0),
+            (2.0001, 1.25),
+            (3.0, 9.0),
+        ];
+        let track = track.map(|(time, x)| (time, TruePose::new(x, 0.0, 0.0)));
+        let found = errors(track.to_vec(), &file, f64::INFINITY).expect("relations");
+        assert_eq!((found.metres, found.degrees, found.used), (0.25, 0.0, 1));
+        // None within half a millisecond.
+        assert!(errors(track[4..].to_vec(), &file, f64::INFINITY).is_err());
+        fs::remove_file(&file).expect("the test's file");
     }
 }

@@ -20,5 +20,6 @@ mod readme;
 mod supervisor;
 mod telemetry;
 mod text;
+mod tiers;
 mod trouble;
 mod uart;

@@ -7,7 +7,7 @@ use beamfix::pipeline::Pipeline;
 use host_tests::board::{card::Card, real_card::RealCard};
 use host_tests::formats::pairs::{self, Pairs};
 use host_tests::matcher::Matcher;
-use host_tests::report::score::{Score, mean};
+use host_tests::report::score::{self, Score, mean};
 use host_tests::{shared, size, sized};
 
 #[test]
@@ -212,6 +212,30 @@ fn hals_have_the_traits_that_the_table_says() {
     }
 }
 
+#[test]
+fn tiers_hold_what_the_table_says() {
+    let rolling = include_str!("../../../src/pipeline/rolling.rs");
+    says(rolling, "pub type Mapper64k = RollingMapper<512, 36, ");
+    has("`Mapper64k`: a map that rolls with the robot, 36 keyframes");
+    let mapper = include_str!("../../../src/pipeline/mapper.rs");
+    says(mapper, "pub type Mapper192k = Mapper<720, 224, ");
+    has("`Mapper192k`: loops closed, 224 keyframes");
+    says(mapper, "pub type Mapper512k = Mapper<1024, 560, ");
+    has("`Mapper512k`: 560 keyframes");
+    let cards: Vec<Card> =
+        serde_json::from_str(include_str!("../../golden/card.json")).expect("a list of cards");
+    let small = cards
+        .iter()
+        .find(|card| card.board == "m0")
+        .expect("a card");
+    has(&format!(
+        "| 16 KB | odometry (`Odometry<{}>` on an M0) | {} + {} |",
+        beamfix_app::SMALL_BEAMS,
+        small.ram_bytes,
+        small.stack_bytes
+    ));
+}
+
 /// Of each hundred, to a tenth; all of them without.
 fn percent(part: usize, of: usize) -> String {
     match 100.0 * part as f64 / of as f64 {
@@ -230,6 +254,38 @@ fn scored<const N: usize>(list: &Pairs, config: &IcpConfig) -> Score {
         score.push(pair.level, pose, pair.truth, found.is_ok());
     }
     score
+}
+
+/// By how much (cm, degrees) the guesses of the levels from 1 on are off at most, in each direction.
+const DISTURBED: [(f64, f64); 4] = [(5.0, 5.0), (10.0, 15.0), (20.0, 30.0), (40.0, 45.0)];
+
+/// The largest disturbance of a level in a direction (m) and of the heading (degrees).
+fn most_disturbed(list: &Pairs, level: i32) -> (f64, f64) {
+    let mut most: (f64, f64) = (0.0, 0.0);
+    for pair in list.pairs.iter().filter(|pair| pair.level == level) {
+        let (_, degrees) = score::error(pair.guess, pair.truth);
+        let off = [pair.guess.x - pair.truth.x, pair.guess.y - pair.truth.y];
+        most.0 = off
+            .iter()
+            .fold(most.0, |most, off| most.max(f64::from(off.abs())));
+        most.1 = most.1.max(degrees);
+    }
+    most
+}
+
+#[test]
+fn the_table_of_accuracy_is_of_these_guesses() {
+    let levels: Vec<String> = DISTURBED
+        .iter()
+        .map(|(cm, degrees)| format!("{cm} cm and {degrees}°"))
+        .collect();
+    has(&format!(
+        "off by up to {}",
+        levels.join(" / ").replacen(" /", " in each direction /", 1)
+    ));
+    assert!(score::is_right((0.0499, 0.999)));
+    assert!(!score::is_right((0.05, 0.0)) && !score::is_right((0.0, 1.0)));
+    has("How many matches (%) are right within 5 cm and 1°");
 }
 
 #[test]
@@ -253,6 +309,14 @@ fn the_table_of_accuracy_is_what_the_lists_give() {
             return;
         };
         let list = pairs::read(&scans, &list).expect("a list of pairs");
+        for (level, (cm, degrees)) in (1..).zip(DISTURBED) {
+            let most = most_disturbed(&list, level);
+            assert!(
+                (0.95..=1.001).contains(&(100.0 * most.0 / cm))
+                    && (0.95..=1.001).contains(&(most.1 / degrees)),
+                "level {level}: {most:?}"
+            );
+        }
         let size = size::fitting(list.scans.iter().map(|scan| &scan[..]));
         let score = sized!(size, scored(&list, &config));
         let levels = score.0.values();

@@ -71,6 +71,36 @@ fn followed<E: Estimator<N>, const N: usize>(
     Some(errors)
 }
 
+/// The README's table of what fits tells these errors, rounded as it does.
+fn told(ram: &str, name: &str, found: &Errors) {
+    let readme = include_str!("../../../../README.md");
+    let row = readme
+        .lines()
+        .find(|line| line.starts_with(&format!("| {ram} |")));
+    let cells: Vec<&str> = row.expect("a row").split('|').map(str::trim).collect();
+    let cell = cells[if name == "intel" { 5 } else { 6 }];
+    let (metres, degrees) = cell.split_once(", ").expect("two numbers");
+    for (text, found) in [
+        (metres.trim_end_matches(" m"), found.metres),
+        (degrees.trim_end_matches('°'), found.degrees),
+    ] {
+        let (_, decimals) = text.split_once('.').expect("a fraction");
+        let digits = decimals.len();
+        assert_eq!(format!("{found:.digits$}"), text, "{ram}, {name}: {cell}");
+    }
+}
+
+#[test]
+fn errors_in_the_readme_are_these() {
+    for (ram, tier) in [("192 KB", Tier::Of192k), ("512 KB", Tier::Of512k)] {
+        for name in ["intel", "fr079"] {
+            if let Some(found) = mapped(name, usize::MAX, true, tier) {
+                told(ram, name, &found);
+            }
+        }
+    }
+}
+
 #[test]
 fn loops_of_a_recorded_building_are_closed() {
     // Measured: 0.0395 m, 0.509 deg; Cartographer on a desktop 0.0452 m, 0.538 deg (Hess et al., ICRA 2016).
@@ -107,6 +137,8 @@ fn a_rolling_map_drifts_less_than_its_odometry() {
         let rolling = followed::<Mapper64k, 512>(name, RollingMapper::new);
         let odometry = followed::<Odometry<512>, 512>(name, Odometry::new);
         if let Some((rolling, odometry)) = rolling.zip(odometry) {
+            told("64 KB", name, &rolling);
+            told("16 KB", name, &odometry);
             // Measured: a third on intel, half on fr079.
             assert!(
                 rolling.metres < 0.6 * odometry.metres && rolling.degrees < 0.6 * odometry.degrees,
