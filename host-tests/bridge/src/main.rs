@@ -38,10 +38,10 @@ struct Args {
     /// Name of the node, as `ros2 node list` shows it.
     #[arg(long, value_name = "NAME", default_value = "beamfix")]
     node: String,
-    /// How the lidar sits on the robot, until the board tells it: only one before version 7 that is not heard starting does not.
+    /// How the lidar sits on the robot, for a board that does not tell it when asked: firmware before version 7 of the telemetry.
     #[arg(long, value_name = "X,Y,DEG[,down]", value_parser = mount::parse, allow_hyphen_values = true)]
     mount: Option<Mount>,
-    /// What the board does, until the board tells it.
+    /// What the board does, for one that does not tell it when asked.
     #[arg(long, value_enum, default_value_t = Doing::Odometry)]
     task: Doing,
     /// A map as ROS has it, published on /map.
