@@ -27,7 +27,10 @@ pub fn config(mount: Mount, directions: usize) -> OdometryConfig {
 
 /// Odometry for a ring of rangers whose beams are so wide (rad).
 #[must_use]
-pub fn sparse_odometry(mount: Mount, beam_width: f32) -> SparseOdometry<{ size::SPARSE }, 32> {
+pub fn sparse_odometry(
+    mount: Mount,
+    beam_width: f32,
+) -> SparseOdometry<{ size::SPARSE }, { size::GATHERED }> {
     SparseOdometry::new(SparseConfig {
         mount,
         beam_width,

@@ -11,6 +11,9 @@ pub const SIZES: [usize; 5] = [360, 456, 512, 720, 1024];
 /// Most beams of a scan by a ring of rangers.
 pub const SPARSE: usize = 64;
 
+/// Scans of a ring of rangers that the next one is matched against.
+pub const GATHERED: usize = 64;
+
 /// Width of a beam (rad) where scans are those of a ring of rangers: few beams, and too far apart for neighbours to show
 /// surfaces.
 #[must_use]

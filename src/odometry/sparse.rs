@@ -32,7 +32,7 @@ pub struct SparseConfig {
     /// Standard deviation of the wheels' heading (rad) after each metre. Default 0.5: a wheel that slips for a moment turns the
     /// robot far more than any tyre.
     pub prior_rotation_error: f32,
-    /// Factor by which the error of a match has a larger variance than its beams alone would make. Default 3: a beam is wide,
+    /// Factor by which the error of a match has a larger variance than its beams alone would make. Default 5: a beam is wide,
     /// and what errs in the scans kept errs in many matches.
     pub match_variance: f32,
     /// Farthest accepted distance of a match from where the wheels lead (m; twice as many radians). Default 0.2: scans follow
@@ -50,7 +50,7 @@ impl SparseConfig {
         beam_width: 0.0982,
         prior_error: 0.1,
         prior_rotation_error: 0.5,
-        match_variance: 3.0,
+        match_variance: 5.0,
         max_correction: 0.2,
         icp: IcpConfig {
             min_inliers: 15,
@@ -90,8 +90,9 @@ impl Default for SparseConfig {
 /// Pose from scans of few wide beams and wheels, in fixed memory.
 ///
 /// All beams of a scan are taken to be measured at its end, in the order of their bearings. N is the most beams of a scan,
-/// K the scans that the next one is matched against, each from another place: 32 are a metre and a half. K·(4·N + 40) bytes
-/// and 10 KB.
+/// K the scans that the next one is matched against, each from another place: 64 are two metres in the flat. Fewer are renewed
+/// more often, and each time the heading drifts; through more, what wide beams show from afar is mixed with what they show from
+/// near by. K·(4·N + 40) bytes and 10 KB.
 #[derive(Debug, Clone)]
 pub struct SparseOdometry<const N: usize, const K: usize> {
     config: SparseConfig,

@@ -2,13 +2,13 @@
 
 use beamfix::geometry::Pose;
 use beamfix::math::wrap_angle;
-use beamfix::odometry::{SparseConfig, SparseOdometry, Step};
+use beamfix::odometry::Step;
 use beamfix::pipeline::Tracker;
 use beamfix::scan::Mount;
 use beamfix_sim::lidar::Ranging;
 use beamfix_sim::ring::{Ring, RingModel};
 use beamfix_sim::{Settings, drive};
-use host_tests::report::score;
+use host_tests::{pipeline::sparse_odometry, report::score};
 
 /// What came of a minute in the flat.
 #[derive(Debug, Default)]
@@ -33,15 +33,12 @@ fn minute(model: RingModel, seed: u64) -> Outcome {
     };
     let mut ring = Ring::new(model, seed);
     let run = drive(&settings, &mut ring);
-    let config = SparseConfig {
-        mount: Mount {
-            robot_from_lidar: settings.mount.into(),
-            ..Mount::DEFAULT
-        },
-        beam_width: model.width() as f32,
-        ..SparseConfig::DEFAULT
+    let mount = Mount {
+        robot_from_lidar: settings.mount.into(),
+        ..Mount::DEFAULT
     };
-    let mut tracker = Box::new(Tracker::<_, 64>::new(SparseOdometry::<64, 32>::new(config)));
+    let odometry = sparse_odometry(mount, model.width() as f32);
+    let mut tracker = Box::new(Tracker::<_, 64>::new(odometry));
     let origin = run.moments[ring.scans[0].0 - 1];
     let (mut outcome, mut measured) = (Outcome::default(), 0.0);
     for (looks, beams) in &ring.scans {
@@ -77,33 +74,30 @@ fn minute(model: RingModel, seed: u64) -> Outcome {
     outcome
 }
 
-/// Settings were chosen on seeds 1 to 8; the others decide.
+/// Settings were chosen on seeds 1 to 16; the others decide.
 #[test]
 #[cfg_attr(debug_assertions, ignore = "drives of a minute")]
 fn a_ring_of_64_beams_follows_a_minute_in_the_flat() {
-    let (mut nees, mut farther) = (0.0, 0);
-    for seed in 1..=16 {
+    let (mut nees, mut confident) = (0.0, 0);
+    for seed in 1..=32 {
         let outcome = minute(RingModel::VL53L5CX, seed);
         println!("seed {seed}: {outcome:.3?}");
-        nees += outcome.nees / 16.0;
+        nees += outcome.nees / 32.0;
+        confident += outcome.confident;
         assert!(
-            outcome.last.0 < 0.15 && outcome.largest.1 < 3.0 && outcome.confident == 0,
+            outcome.largest.0 < 0.15 && outcome.largest.1 < 3.0,
             "seed {seed}: {outcome:?}"
         );
-        // At any time: since matches are refused that have not converged, some are a little farther off for a moment: seeds 12 and 13
-        // 0.17 and 0.18 m. With the beams drawn in the order of a bag, which is other noise, 3, 8, 12 and 13 are 0.16 to 0.17 m off.
-        farther += u32::from(outcome.largest.0 >= 0.15);
-        assert!(outcome.largest.0 < 0.2, "seed {seed}: {outcome:?}");
         // The wheels alone are a metre and 30° off.
         assert!(
             outcome.last.1 < 0.2 * outcome.wheels.1,
             "seed {seed}: {outcome:?}"
         );
     }
-    println!("{farther} of 16 farther off than 0.15 m at some time, NEES {nees:.2}");
-    assert!(farther <= 4, "{farther}");
+    println!("{confident} scans of 32 drives wrong and confident, NEES {nees:.2}");
+    assert!(confident <= 2, "{confident}");
     // 1 is ideal; what errs alike in many matches is allowed for.
-    assert!((0.2..1.2).contains(&nees), "{nees}");
+    assert!((0.67..1.5).contains(&nees), "{nees}");
 }
 
 /// Half of the ring is missing: the pose is several times less exact, and says so.

@@ -9,14 +9,19 @@ use crate::{
 
 /// Directions in which the scans are seen together: every 1.5°, narrower than a beam and wide enough for several places each.
 pub(super) const DIRECTIONS: usize = 240;
+/// Places in one direction lie on one surface if their distances differ by at most this (mm, and as a share of the distance):
+/// noise of a few centimetres, and what a wall askew gains over a beam's width.
+const GAP: (f32, f32) = (60.0, 0.12);
+/// Places measured from nearer by than this (mm) count alike.
+const NEAREST: u16 = 300;
 
 /// Places hit in a direction, as far as they seem to lie on one surface.
 #[derive(Debug, Clone, Copy)]
 struct Heap {
-    x: i32,
-    y: i32,
-    ranges: u32,
-    count: u16,
+    x: f32,
+    y: f32,
+    ranges: f32,
+    weight: f32,
 }
 
 /// A scan that was kept: 40 + 4·N bytes.
@@ -49,10 +54,10 @@ pub(super) struct Gathered<const N: usize, const K: usize> {
 
 impl<const N: usize, const K: usize> Gathered<N, K> {
     const NO_HEAP: Heap = Heap {
-        x: 0,
-        y: 0,
-        ranges: 0,
-        count: 0,
+        x: 0.0,
+        y: 0.0,
+        ranges: 0.0,
+        weight: 0.0,
     };
 
     pub const fn new() -> Self {
@@ -114,7 +119,7 @@ impl<const N: usize, const K: usize> Gathered<N, K> {
                     at[1].saturating_add(seen.y.into()),
                 );
                 if let Some(heap) = self.heaps.get_mut(slots.of(math::atan2_turn(y, x))) {
-                    heap.add(x, y);
+                    heap.add(x, y, range);
                 }
             }
         }
@@ -139,26 +144,33 @@ fn newest_first<const N: usize>(
 }
 
 impl Heap {
-    /// Takes a place (mm) if it lies with the others, or is the first.
-    fn add(&mut self, x: i32, y: i32) {
+    /// Takes a place (mm) that was `from` mm away when it was measured, if it lies with the others, or is the first.
+    fn add(&mut self, x: i32, y: i32, from: u16) {
         let limit = i32::from(i16::MAX);
         if !(-limit..=limit).contains(&x) || !(-limit..=limit).contains(&y) {
             return;
         }
-        let range = math::isqrt((x * x) as u32 + (y * y) as u32);
-        let mean = self.ranges.checked_div(self.count.into()).unwrap_or(range);
-        // Noise of a few centimetres, and what a wall askew gains over a beam's width.
-        let gap = 80 + range * 3 / 20;
-        if mean.abs_diff(range) <= gap && self.count < u16::MAX {
-            (self.x, self.y) = (self.x.saturating_add(x), self.y.saturating_add(y));
-            self.ranges = self.ranges.saturating_add(range);
-            self.count += 1;
+        let range = math::isqrt((x * x) as u32 + (y * y) as u32) as f32;
+        let mean = if self.weight > 0.0 {
+            self.ranges / self.weight
+        } else {
+            range
+        };
+        if math::abs(mean - range) <= GAP.0 + GAP.1 * range {
+            // Range noise and a beam's width across both grow with the range.
+            let weight = 1000.0 / f32::from(from.max(NEAREST));
+            self.x += weight * x as f32;
+            self.y += weight * y as f32;
+            self.ranges += weight * range;
+            self.weight += weight;
         }
     }
 
     fn mean(&self) -> Option<ScanPoint> {
-        let count = i32::from(self.count);
-        let (x, y) = (self.x.checked_div(count)?, self.y.checked_div(count)?);
+        if self.weight <= 0.0 {
+            return None;
+        }
+        let [x, y] = [self.x, self.y].map(|sum| math::round_to_i32(sum / self.weight));
         Some(ScanPoint {
             x: x as i16,
             y: y as i16,
@@ -177,14 +189,14 @@ pub(super) fn places<const N: usize>(
     points: &mut heapless::Vec<ScanPoint, N>,
 ) {
     points.clear();
-    // A full ring closes: the first beam's neighbour is the last.
-    let mut before = scan.beams().next_back();
-    let mut next = scan.beams().skip(1).chain(scan.beams().take(1));
-    for beam in scan.beams() {
-        let after = next.next();
-        if let Some((Bearing(bearing), range)) =
-            wide::surface(&beam, before.as_ref(), after.as_ref(), width)
-        {
+    let count = scan.len();
+    for here in 0..count {
+        // A full ring closes: the first beam's neighbour is the last.
+        let beams = core::array::from_fn::<_, { wide::NEIGHBOURS }, _>(|k| {
+            let from_here = k + wide::NEIGHBOURS / 2 * (count - 1);
+            scan.beams().nth((here + from_here) % count)
+        });
+        if let Some((Bearing(bearing), range)) = wide::surface(&beams, width) {
             let bearing = if upside_down {
                 bearing.wrapping_neg()
             } else {
@@ -192,6 +204,5 @@ pub(super) fn places<const N: usize>(
             };
             let _ = points.push(ScanPoint::at(Bearing(bearing), range.min(32_000)));
         }
-        before = Some(beam);
     }
 }
