@@ -2,11 +2,13 @@
 
 use std::fmt;
 
+use anyhow::{Context, Result, bail};
 pub use beamfix::lidar::choice::{WithParser, with_parser};
 use beamfix::lidar::{Counters, Family, Model, Packet, Protocol, identify};
 use beamfix::scan::Beam;
 
 use crate::formats::capture::{self, Content};
+use crate::formats::unknown;
 
 /// Names that [`decode`] knows.
 pub fn names() -> impl Iterator<Item = &'static str> {
@@ -75,7 +77,7 @@ impl fmt::Display for DecodeError {
 impl std::error::Error for DecodeError {}
 
 /// The model called `name`; for `auto`, the one that `bytes` name or are most likely from.
-pub fn model(name: &str, bytes: &[u8]) -> Result<&'static Model, DecodeError> {
+pub fn model(name: &str, bytes: &[u8]) -> std::result::Result<&'static Model, DecodeError> {
     let name = match name {
         "auto" => capture::lidar(bytes).unwrap_or(name),
         _ => name,
@@ -97,6 +99,18 @@ pub fn model(name: &str, bytes: &[u8]) -> Result<&'static Model, DecodeError> {
     }
 }
 
+/// As [`model`], for the bytes of the file called `file`: where `auto` finds no lidar's frames, the error says what the file
+/// is instead, as far as its look tells.
+pub fn model_of(file: &str, name: &str, bytes: &[u8]) -> Result<&'static Model> {
+    let found = model(name, bytes);
+    if let Err(DecodeError::NothingFits(_)) = found
+        && let Some(what) = unknown::without_frames(file, bytes)
+    {
+        bail!("{file}: auto: {what}");
+    }
+    found.with_context(|| file.to_owned())
+}
+
 /// Names of other models that `bytes` may as well be from, where `auto` chose one by the bytes alone.
 #[must_use]
 pub fn alternatives(name: &str, bytes: &[u8]) -> Vec<&'static str> {
@@ -113,7 +127,11 @@ pub fn alternatives(name: &str, bytes: &[u8]) -> Vec<&'static str> {
 
 /// Decodes `bytes` of the sensor called `name`, or of the one they are from for `auto`; each measurement goes to `sink`
 /// in order. Where the bytes have times ([`capture`]), so have the measurements of sensors without a clock.
-pub fn decode(name: &str, bytes: &[u8], sink: &mut dyn FnMut(Row)) -> Result<Summary, DecodeError> {
+pub fn decode(
+    name: &str,
+    bytes: &[u8],
+    sink: &mut dyn FnMut(Row),
+) -> std::result::Result<Summary, DecodeError> {
     let model = model(name, bytes)?;
     // A scanner that does not see all around counts to both sides.
     let is_signed = matches!(model.family, Family::Scip(_));

@@ -17,7 +17,7 @@ pub mod pairs;
 pub mod ros;
 pub mod ros_map;
 pub mod trajectory;
-mod unknown;
+pub(crate) mod unknown;
 
 use std::path::Path;
 
@@ -179,6 +179,13 @@ pub fn parse(name: String, content: bytes::Content, options: &Options) -> Result
         let bag = ros::bag::Bag::of_file(content);
         cut = None;
         match &bag.attachment {
+            // A ring of rangers has no bytes: its scans are a text.
+            Some(bytes)
+                if bag.topics.is_empty() && bytes.starts_with(carmen::WRITTEN.as_bytes()) =>
+            {
+                cut.clone_from(&bag.cut);
+                Ok(carmen::parse(bytes))
+            }
             Some(bytes) if bag.topics.is_empty() => {
                 let content = bytes::Content {
                     bytes: bytes.clone(),

@@ -38,7 +38,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         content.bytes = capture;
     }
     output::spare(&[&args.file], &[args.csv.as_deref()])?;
-    let model = decode::model(&args.lidar, &content.bytes)?;
+    let model = decode::model_of(&name.to_string(), &args.lidar, &content.bytes)?;
     let mut csv = args.csv.as_deref().map(output::create).transpose()?;
     let mut written = Ok(());
     if let Some(csv) = &mut csv {

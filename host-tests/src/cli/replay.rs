@@ -74,6 +74,8 @@ struct Done {
     measured: usize,
     /// Scans that became a reference; `None` where a map is the reference.
     references: Option<u32>,
+    /// Candidates for a place in a map where they agreed best with a scan, and how well (a share of its beams).
+    candidates: Option<(u8, f32)>,
 }
 
 impl Done {
@@ -88,7 +90,19 @@ impl Done {
                 "no pose: none of {scans} scans became a reference; at most {most} beams of one have a range"
             ),
             Some(_) => format!("no pose: none of {scans} scans matches the first"),
-            None => format!("no pose: the robot was not found in the map in {scans} scans"),
+            None => {
+                let why = match self.candidates {
+                    None => "no place fits".to_owned(),
+                    Some((count, best)) => format!(
+                        "of {count} places the best explains {:.0} % of the beams less those through walls: the rest ends where the map is \
+                         unexplored, on people or on what has moved",
+                        100.0 * best
+                    ),
+                };
+                format!(
+                    "no pose: the robot was not found in the map in {scans} scans: {why}; --start X,Y,DEG tells where it is"
+                )
+            }
         }
     }
 

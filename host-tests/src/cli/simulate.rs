@@ -282,11 +282,12 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
         is_sampled: log.capture.is_some(),
     };
     let mut run = Run::create(&args.out, args.recording_format.into(), &setup)?;
+    // So that `replay` takes the recording too.
     let recording = if log.capture.is_some() {
-        // So that `replay` takes this file too.
         run.attach(ATTACHMENT, &bytes)?;
         RECORDING
     } else {
+        run.attach(ATTACHMENT, carmen::written(&log).as_bytes())?;
         RING_RECORDING
     };
     let mut trajectory = output::create(&args.out.join("trajectory.txt"))?;

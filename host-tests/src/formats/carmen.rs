@@ -10,7 +10,7 @@
 
 mod writer;
 
-pub use writer::written;
+pub use writer::{WRITTEN, written};
 
 use anyhow::{Context, Result, ensure};
 use beamfix::scan::{Beam, Bearing, Mount};

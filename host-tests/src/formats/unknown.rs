@@ -35,13 +35,23 @@ pub fn what_it_is(name: &str, bytes: &[u8], lines: usize) -> String {
             "it is what a board sent, with the lidar's bytes inside: beamfix replay {name} --lidar MODEL"
         );
     }
+    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+        return format!(
+            "it is text in UTF-16: iconv -f UTF-16 -t UTF-8 {name} makes a text of bytes of it"
+        );
+    }
     let text = String::from_utf8_lossy(bytes);
     let is_text = bytes
         .iter()
         .all(|byte| (0x20..0x7f).contains(byte) || b"\t\r\n\x0c".contains(byte) || *byte >= 0xc2);
     if is_text && is_hex(&text) {
+        let bytes_of_it = match dump(&text) {
+            Dump::Plain => format!("xxd -r -p {name}"),
+            Dump::Xxd => format!("xxd -r {name}"),
+            Dump::Hexdump => format!("cut -c10-59 {name} | xxd -r -p"),
+        };
         return format!(
-            "it is a hex dump: xxd -r -p {name} > bytes.bin makes bytes of it, then beamfix replay bytes.bin --lidar auto"
+            "it is a hex dump: {bytes_of_it} > bytes.bin makes bytes of it, then beamfix replay bytes.bin --lidar auto"
         );
     }
     if let Some(finding) = identify::identify(bytes) {
@@ -57,6 +67,62 @@ pub fn what_it_is(name: &str, bytes: &[u8], lines: usize) -> String {
         "{} bytes or more that are no log known here (CARMEN, .lscan, ROS 2 bag, capture); raw bytes of a lidar want --lidar MODEL",
         bytes.len()
     )
+}
+
+/// How a hex dump has its lines.
+enum Dump {
+    /// Bytes alone.
+    Plain,
+    /// An offset with a colon before them.
+    Xxd,
+    /// An offset before them, as `hexdump -C` writes it.
+    Hexdump,
+}
+
+/// By the first line: offsets are longer than what follows them.
+fn dump(text: &str) -> Dump {
+    let line = text.lines().find(|line| !line.trim().is_empty());
+    let mut words = line.unwrap_or("").split_whitespace();
+    let (first, second) = (words.next().unwrap_or(""), words.next().unwrap_or(""));
+    let digits = first.trim_end_matches(':');
+    if first.ends_with(':') {
+        Dump::Xxd
+    } else if digits.len() >= 7 && !digits.contains('x') && second.len() == 2 {
+        Dump::Hexdump
+    } else {
+        Dump::Plain
+    }
+}
+
+/// What a file is in which no lidar's frames were found, if its look tells: a text, an archive, a log that wants no `--lidar`.
+pub fn without_frames(name: &str, bytes: &[u8]) -> Option<String> {
+    let start = bytes.get(..LOOKED_AT).unwrap_or(bytes);
+    let lines = start.split(|byte| *byte == b'\n').count();
+    let text = String::from_utf8_lossy(start);
+    if text
+        .lines()
+        .any(|line| line.starts_with("FLASER ") || line.starts_with("ROBOTLASER1 "))
+    {
+        return Some(format!(
+            "it is a CARMEN log: beamfix replay {name}, without --lidar"
+        ));
+    }
+    if start.starts_with(b"\x89MCAP") || start.starts_with(b"SQLite format 3\0") {
+        return Some(format!(
+            "it is a ROS 2 bag: beamfix replay {name}, without --lidar"
+        ));
+    }
+    if start.starts_with(b"LSCN") {
+        return Some(format!(
+            "it is a log of scans: beamfix replay {name}, without --lidar"
+        ));
+    }
+    let what = what_it_is(name, start, lines);
+    what.starts_with("it is ")
+        .then(|| match what.split_once(", but no FLASER") {
+            Some((text, _)) => format!("{text} in which no lidar's frames are"),
+            None => what,
+        })
 }
 
 /// Whether a text is bytes in hexadecimal, with or without the offsets and letters that `xxd` and `hexdump` add.
@@ -97,7 +163,17 @@ mod tests {
                 b"00000000: 542c 6808 ab7e e000 e4dc 00e2 d900 e5d5  T,h..~..........\n",
                 "hex dump",
             ),
-            (b"0x54, 0x2c, 0x68, 0x08, 0xab\n", "hex dump"),
+            (b"0x54, 0x2c, 0x68, 0x08, 0xab\n", "xxd -r -p x.bin >"),
+            // With an offset the bytes alone are wanted.
+            (
+                b"00000000: 542c 6808 ab7e e000 e4dc 00e2 d900 e5d5  T,h..~..........\n",
+                "xxd -r x.bin >",
+            ),
+            (
+                b"00000000  54 2c 68 08 ab 7e e0 00  e4 dc 00 e2 d9 00 e5 d5  |T,h..~..........|\n",
+                "cut -c10-59 x.bin | xxd -r -p >",
+            ),
+            (b"\xff\xfeh\0i\0\n\0", "UTF-16"),
             (b"dead beef is what the log says here today\n", "text"),
             (b"$GPGGA,123519,4807.038,N,01131.000,E,1,08*47\n", "text"),
             (&[0, 1, 2, 3, 250, 7], "no log known"),

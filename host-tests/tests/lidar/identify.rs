@@ -117,6 +117,15 @@ fn plain_words_where_something_is_wrong() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let noise: Vec<u8> = (0..20_000).map(|_| rng.random()).collect();
     assert_eq!(identify(&noise), None);
+    // Of what looks like a frame's start one in 256 passes a check code of 8 bits.
+    for length in [300, 3_000, 30_000, 100_000] {
+        for seed in 0..20 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let noise: Vec<u8> = (0..length).map(|_| rng.random()).collect();
+            let found = identify(&noise).map(|found| (found.model.name, found.survey));
+            assert_eq!(found, None, "{length} bytes, seed {seed}");
+        }
+    }
     assert_eq!(all(&Model::LDROBOT_LD06, &noise), [Hint::NothingFits]);
 
     let ld06 = second(&Model::LDROBOT_LD06);

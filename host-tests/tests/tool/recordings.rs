@@ -624,6 +624,45 @@ fn what_is_no_log_is_named_with_the_way_to_read_it() {
     }
 }
 
+#[test]
+fn a_file_without_a_lidars_frames_is_named_by_what_it_is() {
+    let dir = folder("without-frames");
+    let hex: String = drive_bytes()[..400]
+        .chunks(16)
+        .map(|row| {
+            let bytes: Vec<String> = row.iter().map(|byte| format!("{byte:02x}")).collect();
+            format!("00000010: {}  ................\n", bytes.join(""))
+        })
+        .collect();
+    let bag = bag(&SCANNER, 0.0).mcap(None);
+    for (name, content, words) in [
+        (
+            "notes.txt",
+            &b"nothing of use\n".repeat(40)[..],
+            "it is text in which no lidar's frames are",
+        ),
+        ("dump.txt", hex.as_bytes(), "xxd -r dump.txt >"),
+        (
+            "x.log",
+            b"FLASER 3 1.0 1.0 1.0 0 0 0\n",
+            "it is a CARMEN log",
+        ),
+        ("x.mcap", &bag, "it is a ROS 2 bag"),
+        ("x.bag", b"#ROSBAG V2.0\n", "ROS 1 bag"),
+        ("x.png", b"\x89PNG\r\n\x1a\n", "a picture"),
+    ] {
+        let path = dir.join(name);
+        fs::write(&path, content).expect("the test's file");
+        for command in ["replay", "decode"] {
+            let output = beamfix(&[command, text(&path), "--lidar", "auto"]);
+            let said = stderr(&output).replace(&format!("{}/", text(&dir)), "");
+            assert_eq!(output.status.code(), Some(2), "{command} {name}");
+            assert!(said.contains(words), "{command} {name}: {said}");
+            assert_eq!(said.trim_end().lines().count(), 1, "{command} {name}");
+        }
+    }
+}
+
 fn drive_bytes() -> Vec<u8> {
     use beamfix_sim::encoder::ld06::Sensor;
     use beamfix_sim::{Settings, drive};
@@ -730,6 +769,21 @@ fn a_simulated_run_replays_from_each_of_its_files() {
         let result = json(&beamfix(&["replay", text(&dir.join(name)), "--json"]));
         assert_eq!(result["pose_hash"], run["pose_hash"], "{name}");
         assert_eq!(result["lidar"], "ld06", "{name}");
+    }
+    let ring = dir.join("ring");
+    let run = json(&beamfix(&[
+        "simulate",
+        "--out",
+        text(&ring),
+        "--seconds",
+        "5",
+        "--lidar",
+        "vl53l5cx-ring",
+        "--json",
+    ]));
+    for name in ["ring.log", "run.mcap"] {
+        let result = json(&beamfix(&["replay", text(&ring.join(name)), "--json"]));
+        assert_eq!(result["pose_hash"], run["pose_hash"], "ring: {name}");
     }
     let capture = fs::read(dir.join("lidar.rec")).expect("written");
     let output = replay(&dir.join("cut.rec"), &capture[..capture.len() - 7], &[]);
@@ -854,6 +908,20 @@ fn beams_that_say_nothing_do_not_count_against_a_pose() {
             text(&trajectory),
             "--json",
         ]));
+        // Half of the beams are no evidence for one place among all: that is said, and what to do.
+        let arguments = [
+            "replay",
+            text(&log),
+            "--mode",
+            "localize",
+            "--map",
+            text(&map),
+        ];
+        let output = beamfix(&arguments);
+        assert_eq!(output.status.code(), Some(2));
+        let said = stderr(&output);
+        assert!(said.contains("places the best explains"), "{said}");
+        assert!(said.contains("--start X,Y,DEG"), "{said}");
         // It stands where it starts.
         let place = TruePose::new(-0.6, 0.3, 11.459f64.to_radians());
         let off = apart(place, last_pose(&result));

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use beamfix::geometry::Pose;
-use beamfix::localization::{Localizer, LocalizerConfig};
+use beamfix::localization::{Localizer, LocalizerConfig, Verdict as Localization};
 use beamfix::matching::correlative::pyramid::Pyramid;
 use beamfix::pipeline::{Estimate as _, MapLocalizer, Verdict};
 use beamfix::scan::PointsConfig;
@@ -27,6 +27,8 @@ struct Outcome {
     /// Times the pose was lost.
     lost: u32,
     searches: u32,
+    /// Candidates of the scan that agreed best with one of them, and how well (a share of its beams).
+    candidates: Option<(u8, f32)>,
     refused_beams: u32,
     hash: PoseHash,
     last: Pose,
@@ -58,6 +60,7 @@ pub fn run(args: &Args, log: &Log, size: usize) -> Result<Done> {
         scans: outcome.scans,
         measured: outcome.tracked,
         references: None,
+        candidates: outcome.candidates,
     })
 }
 
@@ -85,12 +88,21 @@ fn in_map<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
     let bar = output::progress(count, "localizing");
     let mut leave = args.leave(log, true)?;
     let (mut tracked, mut doubtful) = (0, 0);
+    let mut candidates: Option<(u8, f32)> = None;
     let ego = (count, args.uses_wheels());
     let followed = follow(log, ego, localizer, &mut |scan, pose, located| {
         match located.verdict() {
             Verdict::Measured => tracked += 1,
             Verdict::Predicted => doubtful += 1,
             Verdict::Unknown => {}
+        }
+        if let Localization::Choosing {
+            candidates: count,
+            best,
+        } = located.outcome
+            && candidates.is_none_or(|(_, before)| best > before)
+        {
+            candidates = Some((count, best));
         }
         if located.pose.is_some() {
             let is_measured = located.verdict() == Verdict::Measured;
@@ -117,6 +129,7 @@ fn in_map<const N: usize>(args: &Args, log: &Log) -> Result<Outcome> {
         doubtful,
         lost: counters.lost,
         searches: counters.searches,
+        candidates,
         refused_beams: followed.refused_beams,
         hash: followed.hash,
         last: followed.last,

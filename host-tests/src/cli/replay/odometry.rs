@@ -19,8 +19,9 @@ pub fn run(args: &Args, log: &Log, (size, directions): (usize, usize)) -> Result
     let outcome = match width {
         Some(width) => {
             output::remark(&[format!(
-                "beams {:.1}° apart are a ring of rangers: the last 32 scans together are what the next one is matched against",
-                width.to_degrees()
+                "beams {:.1}° apart are a ring of rangers: the last {} scans together are what the next one is matched against",
+                width.to_degrees(),
+                size::GATHERED
             )]);
             let odometry = sparse_odometry(args.mount_of(log), width);
             replay(args, log, (odometry, "odometry"), step, |_| 0)
@@ -81,6 +82,7 @@ fn report(args: &Args, log: &Log, size: usize, outcome: &Followed<Counted>) -> R
         scans,
         measured: if is_matched { measured } else { 0 },
         references: Some(keyframes),
+        candidates: None,
     })
 }
 

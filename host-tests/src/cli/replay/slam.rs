@@ -110,5 +110,6 @@ pub fn run(args: &Args, log: &Log, directions: usize) -> Result<Done> {
         scans,
         measured: if is_matched { measured } else { 0 },
         references: Some(keyframes),
+        candidates: None,
     })
 }

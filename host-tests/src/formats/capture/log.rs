@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use beamfix::geometry::Pose;
 use beamfix::scan::{Assembler, Beam, Mount};
 
@@ -87,7 +87,7 @@ pub fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Result<Log
     if let Some(capture) = telemetry::capture(&content.bytes) {
         content.bytes = capture;
     }
-    let model = decode::model(lidar, &content.bytes).with_context(|| name.to_owned())?;
+    let model = decode::model_of(name, lidar, &content.bytes)?;
     let (revolutions, summary) = revolutions(model.name, &content.bytes)?;
     ensure!(
         summary.packets > 0,

@@ -7,6 +7,9 @@ use beamfix_sim::TruePose;
 
 use crate::formats::Log;
 
+/// The first line of a log that is written here.
+pub const WRITTEN: &str = "# ROBOTLASER1 lines as CARMEN writes them\n";
+
 /// Longest range that is written (m); a beam without a return gets it.
 const MAX_RANGE: f64 = 65.535;
 
@@ -14,7 +17,7 @@ const MAX_RANGE: f64 = 65.535;
 /// ranges to a millimetre.
 #[must_use]
 pub fn written(log: &Log) -> String {
-    let mut text = String::from("# ROBOTLASER1 lines as CARMEN writes them\n");
+    let mut text = String::from(WRITTEN);
     let mount: TruePose = log.mount.robot_from_lidar.into();
     for scan in &log.scans {
         let count = scan.beams.len();

@@ -38,10 +38,23 @@ pub(super) fn best(bytes: &[u8]) -> Option<(&'static Model, Survey)> {
     for model in candidates() {
         let survey = survey_model(model, bytes);
         let is_better = best.is_none_or(|(_, best)| survey.covered_bytes > best.covered_bytes);
-        // A whole second holds more; a single frame is no proof of a check code of 8 bits, but better than nothing.
-        if survey.frames >= 1 && is_better {
+        if is_better && !is_chance(survey, bytes.len()) {
             best = Some((model, survey));
         }
     }
     best
+}
+
+/// Whether frames among these bytes may be what a check code of 8 bits lets pass by chance: one in 256 of what looks like
+/// the start of a frame. A few frames count only where they are most of the candidates and much of the bytes.
+const fn is_chance(survey: Survey, length: usize) -> bool {
+    let Survey {
+        frames,
+        covered_bytes,
+        check_errors,
+    } = survey;
+    let few = frames < 3;
+    let is_much = covered_bytes as u64 * 8 >= length as u64;
+    let share = if few { 8 } else { 32 };
+    frames == 0 || (few && !is_much) || frames.saturating_mul(share) <= check_errors
 }
