@@ -102,6 +102,12 @@ pub fn model(name: &str, bytes: &[u8]) -> std::result::Result<&'static Model, De
 /// As [`model`], for the bytes of the file called `file`: where `auto` finds no lidar's frames, the error says what the file
 /// is instead, as far as its look tells.
 pub fn model_of(file: &str, name: &str, bytes: &[u8]) -> Result<&'static Model> {
+    // Frames in an archive that stores them as they are would be found, and cut by what lies between.
+    if name == "auto"
+        && let Some(what) = unknown::other_than_bytes(file, bytes)
+    {
+        bail!("{file}: auto: {what}");
+    }
     let found = model(name, bytes);
     if let Err(DecodeError::NothingFits(_)) = found
         && let Some(what) = unknown::without_frames(file, bytes)

@@ -22,13 +22,28 @@ const KNOWN: [(&[u8], &str); 8] = [
     (b"\x7fELF", "a program"),
 ];
 
+/// A tar archive, told by what stands behind its first name.
+const TAR: &str = "a tar archive: unpack it";
+
+/// What a file is that begins as no lidar's bytes do, an archive or a picture, though frames may lie in it uncompressed. Two or
+/// three bytes tell nothing: a capture may begin with any.
+pub fn other_than_bytes(name: &str, bytes: &[u8]) -> Option<String> {
+    let tar = (bytes.get(257..262) == Some(b"ustar")).then_some(TAR);
+    let what = KNOWN
+        .iter()
+        .find(|(magic, _)| magic.len() > 3 && bytes.starts_with(magic))
+        .map(|(_, what)| *what)
+        .or(tar)?;
+    Some(format!("it is {}", what.replace("FILE", name)))
+}
+
 /// What a file is that starts with `bytes` and has no scan, in a few words.
 pub fn what_it_is(name: &str, bytes: &[u8], lines: usize) -> String {
     if let Some((_, what)) = KNOWN.iter().find(|(magic, _)| bytes.starts_with(magic)) {
         return format!("it is {}", what.replace("FILE", name));
     }
-    if bytes.get(257..262) == Some(b"ustar") {
-        return "it is a tar archive: unpack it".into();
+    if let Some(what) = other_than_bytes(name, bytes) {
+        return what;
     }
     if telemetry::capture(bytes).is_some() {
         return format!(

@@ -635,7 +635,14 @@ fn a_file_without_a_lidars_frames_is_named_by_what_it_is() {
         })
         .collect();
     let bag = bag(&SCANNER, 0.0).mcap(None);
+    // Archives that hold a capture as it is: its frames are found, and are cut by the archive's own bytes.
+    let zip = [&b"PK\x03\x04\x0a\0\0\0\0\0"[..], &drive_bytes()].concat();
+    let mut tar = vec![0; 512];
+    tar[257..262].copy_from_slice(b"ustar");
+    tar.extend(drive_bytes());
     for (name, content, words) in [
+        ("stored.zip", &zip[..], "a zip archive"),
+        ("x.tar", &tar, "a tar archive"),
         (
             "notes.txt",
             &b"nothing of use\n".repeat(40)[..],
