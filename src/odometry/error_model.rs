@@ -47,26 +47,34 @@ pub(super) fn unforeseen(duration: f32) -> Covariance {
 }
 
 /// Covariance of the pose at a scan's end where the velocity has changed by `change` since the scan before: one velocity
-/// deskews all `duration` (s) of it.
+/// deskews all `duration` (s) of it. `late` is the squared share of a change that wheels miss.
 ///
-/// A constant acceleration is undone to first order; one that began in the middle of the scan leaves a quarter of the
-/// change with wheels, which tell the mean velocity of the scan, and half of it without. What the noise of three matches
-/// (each of covariance `of_match`) changes the velocity by on the mean is left out. A scan bent by a rotation is moved as
+/// A constant acceleration is undone to first order. With wheels, which tell the mean velocity of the scan, a change that sets in at
+/// any moment u of it (0 to 1) moves the end by u/2 of the change that is seen, less the twelfth that is undone: the mean square
+/// over u, each weighed by the square of the change that is seen, (1 - u)², is 1/90. Without wheels, or with wheels that tell of it a
+/// scan later, half of the change is left. What the noise of three matches (each of covariance `of_match`) changes the velocity
+/// by on the mean is left out. A scan bent by a rotation is moved as
 /// well: of beams all around that are turned by -θ to θ from the first to the last, places `range` (m) away move by
 /// `range`·θ/π on the mean. With wheels, whose mean rate is right, the beams between the first and the last are turned by half of θ
 /// at most, and it is `range`·θ/π². `bent` is a rotation (rad) of the end that the residuals tell.
 pub(super) fn skew(
     change: Twist,
     duration: f32,
-    source: Source,
+    (source, late): (Source, f32),
     (of_match, range, bent): (&Covariance, f32, f32),
 ) -> Covariance {
-    let (share, moving) = match source {
-        Source::Wheels => (0.25, FRAC_1_PI * FRAC_1_PI),
-        Source::Velocity => (0.5, FRAC_1_PI),
+    /// Squared shares of a change that is told at once, and a scan later.
+    const SHARES: (f32, f32) = (1.0 / 90.0, 0.25);
+    let (square, moving) = match source {
+        Source::Wheels => (
+            SHARES.0 + (SHARES.1 - SHARES.0) * late,
+            FRAC_1_PI * FRAC_1_PI,
+        ),
+        Source::Velocity => (SHARES.1, FRAC_1_PI),
     };
     /// Variances of a match in a change of velocity, which is 1, -2 and 1 times a match's error.
     const NOISE: f32 = 6.0;
+    let share = math::sqrt(square);
     let rest = |change: f32, noise: f32| {
         let change = duration * change;
         share * math::sqrt(math::max(change * change - NOISE * noise, 0.0))
@@ -89,10 +97,12 @@ fn spread(distance: f32, rotation: f32) -> Covariance {
 pub(super) struct WheelErrors {
     translation: Ratio,
     rotation: Ratio,
-    /// What the last scan added to `off` (m, m, rad), where that is known.
-    last: Option<[f32; 3]>,
-    /// Difference between match and wheels since the keyframe.
-    off: Option<Pose>,
+    /// What the last scan added to `off` (m, m, rad), where two matches in a row are known.
+    last: [f32; 3],
+    /// Difference between match and wheels since the keyframe, where one is.
+    off: Pose,
+    /// Matches in a row since the keyframe or a gap, up to two. Not options: their tags would take 8 bytes.
+    known: u8,
     /// Scans in a row whose matches agreed with them; stays at the most.
     agreed: u8,
 }
@@ -139,8 +149,9 @@ impl WheelErrors {
         Self {
             translation: Ratio::new(1e-3),
             rotation: Ratio::new(1e-3),
-            last: None,
-            off: None,
+            last: [0.0; 3],
+            off: Pose::IDENTITY,
+            known: 0,
             agreed: 0,
         }
     }
@@ -177,7 +188,7 @@ impl WheelErrors {
 
     /// Forgets where match and wheels differed: another keyframe, or no match.
     pub fn interrupt(&mut self) {
-        (self.last, self.off) = (None, None);
+        self.known = 0;
     }
 
     /// Learns from a match: `off` is the matched pose as seen from the wheels' pose since the keyframe, `motion` what
@@ -187,17 +198,22 @@ impl WheelErrors {
     /// scan, `u² + 2·u·u'` is free of the former on the mean. What `u²` has more than twice the noise of a match comes and
     /// goes with the wheels.
     pub fn learn(&mut self, off: Pose, share: f32, motion: Pose, of_match: &Covariance) {
-        let change = self.off.replace(off).map(|before| {
-            [
-                off.x - before.x,
-                off.y - before.y,
-                math::wrap_angle(off.theta - before.theta),
-            ]
-        });
-        let last = core::mem::replace(&mut self.last, change);
-        let (Some([x, y, t]), Some([lx, ly, lt])) = (change, last) else {
+        let before = core::mem::replace(&mut self.off, off);
+        let known = self.known;
+        self.known = u8::min(known + 1, 2);
+        if known == 0 {
             return;
-        };
+        }
+        let change = [
+            off.x - before.x,
+            off.y - before.y,
+            math::wrap_angle(off.theta - before.theta),
+        ];
+        let [lx, ly, lt] = core::mem::replace(&mut self.last, change);
+        if known == 1 {
+            return;
+        }
+        let [x, y, t] = change;
         let (distance, rotation) = EgoMotion::wheel_errors(share, motion);
         let noise = &of_match.0;
         let square = x * x + y * y;
@@ -267,10 +283,13 @@ mod tests {
             omega: 1.0,
             ..Twist::ZERO
         };
-        let of = |range| skew(turning, 0.1, Source::Velocity, (&exact, range, 0.0)).0;
+        let of = |range| skew(turning, 0.1, (Source::Velocity, 1.0), (&exact, range, 0.0)).0;
         assert!((math::sqrt(of(3.0).tt) - 0.05).abs() < 1e-6);
         assert_eq!(of(0.0).xx, 0.0);
         // 2.9° of places 3 m away.
         assert!((math::sqrt(of(3.0).xx) - 0.048).abs() < 1e-3);
+        let wheels = |late| skew(turning, 0.1, (Source::Wheels, late), (&exact, 0.0, 0.0)).0;
+        assert!((math::sqrt(wheels(0.0).tt) - 0.0105).abs() < 1e-4);
+        assert_eq!(wheels(1.0).tt, of(0.0).tt);
     }
 }

@@ -127,9 +127,7 @@ impl Motion {
         }
         let between = times.seconds + 0.5 * (self.duration - times.duration);
         let by_wheels = wheels.unwrap_or(Twist::ZERO);
-        let wheel_motion = self.wheel_twist.displacement(0.5 * self.duration)
-            * by_wheels.displacement(times.seconds - 0.5 * times.duration);
-        let missed = wheel_motion.between(self.middle.between(middle));
+        let missed = self.missed(middle, by_wheels, times);
         if wheels.is_some() && missed.distance() < SLIP.0 && math::abs(missed.theta) < SLIP.1 {
             return by_wheels;
         }
@@ -139,6 +137,14 @@ impl Motion {
             vy: by_wheels.vy + missed.vy,
             omega: by_wheels.omega + missed.omega,
         }
+    }
+
+    /// Motion from the last scan's middle to this one's, found at `middle`, as seen from where wheels say it ended that turned with
+    /// `wheels` during this scan.
+    pub fn missed(&self, middle: Pose, wheels: Twist, times: Times) -> Pose {
+        let wheel_motion = self.wheel_twist.displacement(0.5 * self.duration)
+            * wheels.displacement(times.seconds - 0.5 * times.duration);
+        wheel_motion.between(self.middle.between(middle))
     }
 
     /// How far ahead the rate of turn during a scan is of `omega` (rad/s), the rate from the last scan's middle to this one's

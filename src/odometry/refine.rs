@@ -2,6 +2,7 @@
 //! again where that differs.
 
 use super::{
+    error_model,
     motion::{Source, Times},
     prior::Prior,
     state::Odometry,
@@ -16,7 +17,7 @@ use crate::{
 
 impl<const N: usize> Odometry<N> {
     /// Fuses match and prior, and places the robot there. If the match implies another velocity than the scan was deskewed
-    /// with, deskews and matches again first.
+    /// with, deskews and matches again first. How much more the wheels missed than before of the rotation since the last scan (rad).
     #[inline(never)]
     pub(super) fn refine(
         &mut self,
@@ -24,7 +25,7 @@ impl<const N: usize> Odometry<N> {
         (found, expected): (&mut Match, Twist),
         prior: &Prior,
         times: Times,
-    ) {
+    ) -> f32 {
         let back = -0.5 * times.duration;
         let (end, _) = self.robot_pose(found);
         self.deskewed.pose = end;
@@ -76,7 +77,14 @@ impl<const N: usize> Odometry<N> {
         } else {
             self.motion.unskewed(during, prior.source, times)
         };
+        let more = prior.wheel_twist.map_or(0.0, |wheels| {
+            let missed = self.motion.missed(middle, wheels, times).theta;
+            let change = (during.omega - self.motion.twist.omega) * times.duration;
+            let unforeseen = error_model::unforeseen(times.duration).0.tt;
+            self.lateness.push(missed, change, unforeseen)
+        });
         self.place(found, (middle, during), unskewed, (prior, times));
+        more
     }
 
     /// Deskews the scan with another velocity and matches it again, with the robot at `middle` in its middle; whether that

@@ -1,8 +1,8 @@
 //! What the odometry remembers from scan to scan.
 
 use super::{
-    config::OdometryConfig, deskew::Deskewed, error_model::WheelErrors, motion::Motion,
-    step::Counters, tracking::Tracking,
+    config::OdometryConfig, deskew::Deskewed, error_model::WheelErrors, lateness::Lateness,
+    motion::Motion, step::Counters, tracking::Tracking,
 };
 use crate::{
     geometry::{Pose, Twist},
@@ -26,6 +26,7 @@ pub struct Odometry<const N: usize> {
     pub(super) motion: Motion,
     pub(super) tracking: Tracking,
     pub(super) wheel_errors: WheelErrors,
+    pub(super) lateness: Lateness,
     /// End of the last scan (µs), where there was one.
     pub(super) end_us: Option<u32>,
     pub(super) refused_in_a_row: u8,
@@ -45,6 +46,7 @@ impl<const N: usize> Odometry<N> {
             motion: Motion::STANDING,
             tracking: Tracking::at(Pose::IDENTITY, 0.0),
             wheel_errors: WheelErrors::new(),
+            lateness: Lateness::UNKNOWN,
             end_us: None,
             refused_in_a_row: 0,
             counters: Counters {
@@ -62,6 +64,12 @@ impl<const N: usize> Odometry<N> {
     #[must_use]
     pub const fn pose(&self) -> Pose {
         self.pose
+    }
+
+    /// Covariance of the last pose (m², rad²) without the motion within the scan, which the next match corrects: its growth from one
+    /// pose to a later one is what the motion between them is uncertain by. That of [`Step::covariance`](super::Step) may shrink.
+    pub(crate) const fn settled_covariance(&self) -> &Covariance {
+        &self.covariance
     }
 
     /// The robot's velocity during the last scan.

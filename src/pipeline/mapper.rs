@@ -103,9 +103,8 @@ impl<const N: usize, const K: usize, const E: usize, const L: usize, const B: us
         let odometry = self.odometry.update(scan, ego);
         let points = self.odometry.points().as_slice();
         let mount = self.robot_from_lidar;
-        let placed = self
-            .slam
-            .update(odometry.pose, &odometry.covariance, mount, points);
+        let covariance = self.odometry.settled_covariance();
+        let placed = self.slam.update(odometry.pose, covariance, mount, points);
         let lidar = placed.and_then(|placed| self.slam.pose(&placed));
         Mapped {
             pose: lidar.map_or(odometry.pose, |lidar| lidar * mount.inverse()),

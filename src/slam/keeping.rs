@@ -29,7 +29,8 @@ impl<const K: usize, const E: usize, const L: usize, const B: usize, const V: us
     Slam<K, E, L, B, V>
 {
     /// Takes a scan's points, seen from `robot_from_lidar` on a robot that odometry says is at `robot`, with the covariance
-    /// that it tells of this pose since the start. Says in which keyframe's frame the lidar is.
+    /// that it tells of this pose since the start: how much that grows between two keyframes is how far off the motion between them may
+    /// be, so that errors which the next scan undoes do not belong there. Says in which keyframe's frame the lidar is.
     ///
     /// `None` for a pose that is not finite, and as long as there is no keyframe, of the place to which the robot was
     /// carried either. Takes no time but for a keyframe.

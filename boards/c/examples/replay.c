@@ -43,7 +43,7 @@ int main(void) {
     beamfix *robot;
     beamfix_step step;
     beamfix_health health;
-    uint8_t bytes[64];
+    uint8_t bytes[16]; /* Small: on a board of 16 KB the stack has 3.4 KB. */
     uint32_t poses = 0;
     size_t count;
     if (beamfix_make_odometry_small(storage, sizeof storage, &BEAMFIX_LDROBOT_LD06, NULL, &robot) != BEAMFIX_STATUS_OK) {
