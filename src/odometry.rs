@@ -140,7 +140,7 @@ impl<const N: usize> Odometry<N> {
         prior: &Prior,
         times: Times,
     ) -> Covariance {
-        /// Largest difference between the rotation by wheels that jumped and the one that was found that is believed (rad).
+        /// Largest difference between the rotation by the wheels and the one that was found that is believed (rad).
         const MAX_ROTATION: f32 = 0.35;
         let range = self.mean_range();
         outcome
