@@ -70,7 +70,7 @@ impl Lateness {
 mod tests {
     use super::*;
 
-    /// Squared share that is missed by wheels which tell `told` of the rotation (rad) of each scan.
+    /// What is learned of wheels that say `told` of the rotations (rad) of all scans and a scan's number.
     fn learned(told: impl Fn(&[f32], usize) -> f32) -> Lateness {
         let mut lateness = Lateness::UNKNOWN;
         // To and fro, half a second each.
