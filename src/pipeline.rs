@@ -171,6 +171,12 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
         &self.lidar
     }
 
+    /// The parser, to tell it what the lidar has said of itself.
+    #[cfg(feature = "internals")]
+    pub const fn lidar_mut(&mut self) -> &mut P {
+        &mut self.lidar
+    }
+
     /// What stands behind the parser, for its counters and poses.
     pub const fn tracker(&self) -> &Tracker<E, N> {
         &self.tracker

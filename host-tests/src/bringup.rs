@@ -63,8 +63,7 @@ pub fn start(port: &mut dyn SerialPort, name: &str, baud: Option<u32>) -> Result
             ..model
         };
         port.set_baud_rate(model.baud)?;
-        asked(port, &model, StartConfig::DEFAULT)?;
-        return Ok(model);
+        return asked(port, &model, StartConfig::DEFAULT);
     }
     let mut bauds: Vec<u32> = match baud {
         Some(baud) => vec![baud],
@@ -76,7 +75,7 @@ pub fn start(port: &mut dyn SerialPort, name: &str, baud: Option<u32>) -> Result
     for &baud in &bauds {
         port.set_baud_rate(baud)?;
         if let Some(model) = told(port)? {
-            return Ok(Model { baud, ..model });
+            return with_zero(port, Model { baud, ..model });
         }
     }
     // Whoever must be asked is asked in each of the ways, at its speed.
@@ -92,15 +91,21 @@ pub fn start(port: &mut dyn SerialPort, name: &str, baud: Option<u32>) -> Result
         if asked(port, model, HASTY).is_ok()
             && let Some(found) = told(port)?
         {
-            return Ok(Model {
-                baud: model.baud,
-                ..found
-            });
+            let baud = model.baud;
+            return with_zero(port, Model { baud, ..found });
         }
     }
     bail!(
         "no lidar is heard at {bauds:?} bits/s, nor answers: --lidar names it; is the line's cable right, does it spin?"
     )
+}
+
+/// A model that was heard, with the zero that its unit keeps, where it keeps one: it is started again for that.
+fn with_zero(port: &mut dyn SerialPort, heard: Model) -> Result<Model> {
+    match heard.start {
+        Start::Ydlidar { keeps_zero: true } => asked(port, &heard, StartConfig::DEFAULT),
+        _ => Ok(heard),
+    }
 }
 
 /// Which lidar speaks, by what it sends.
@@ -113,8 +118,8 @@ fn told(port: &mut dyn SerialPort) -> Result<Option<Model>> {
     Ok(identify(&heard).map(|finding| *finding.model))
 }
 
-/// Sends what a sensor is started with, and reads its answers.
-fn asked(port: &mut dyn SerialPort, model: &Model, config: StartConfig) -> Result<()> {
+/// Sends what a sensor is started with, and reads its answers; gives the model with what the unit told of itself.
+fn asked(port: &mut dyn SerialPort, model: &Model, config: StartConfig) -> Result<Model> {
     let mut startup = Startup::new(model, config);
     let (began, mut bytes) = (Instant::now(), [0; 256]);
     loop {
@@ -134,7 +139,12 @@ fn asked(port: &mut dyn SerialPort, model: &Model, config: StartConfig) -> Resul
                 bytes[..n].iter().for_each(|&byte| startup.push(byte));
             }
             // In the mode that the model's parser reads.
-            Action::Ready(_) => return Ok(()),
+            Action::Ready(_) => {
+                return Ok(Model {
+                    zero_cdeg: startup.zero_cdeg().unwrap_or(model.zero_cdeg),
+                    ..*model
+                });
+            }
             Action::Failed(error) => bail!("{}: {error}", model.name),
         }
     }

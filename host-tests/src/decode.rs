@@ -79,7 +79,7 @@ impl std::error::Error for DecodeError {}
 /// The model called `name`; for `auto`, the one that `bytes` name or are most likely from.
 pub fn model(name: &str, bytes: &[u8]) -> std::result::Result<&'static Model, DecodeError> {
     let name = match name {
-        "auto" => capture::lidar(bytes).unwrap_or(name),
+        "auto" => named_by(bytes).unwrap_or(name),
         _ => name,
     };
     if name != "auto" {
@@ -97,6 +97,11 @@ pub fn model(name: &str, bytes: &[u8]) -> std::result::Result<&'static Model, De
             ))
         }
     }
+}
+
+/// The lidar that a capture names, where it is in the table: a firmware may have a row of its own, whose frames tell more.
+fn named_by(bytes: &[u8]) -> Option<&str> {
+    capture::lidar(bytes).filter(|name| Model::named(name).is_some())
 }
 
 /// As [`model`], for the bytes of the file called `file`: where `auto` finds no lidar's frames, the error says what the file
@@ -120,7 +125,7 @@ pub fn model_of(file: &str, name: &str, bytes: &[u8]) -> Result<&'static Model> 
 /// Names of other models that `bytes` may as well be from, where `auto` chose one by the bytes alone.
 #[must_use]
 pub fn alternatives(name: &str, bytes: &[u8]) -> Vec<&'static str> {
-    if name != "auto" || capture::lidar(bytes).is_some() {
+    if name != "auto" || named_by(bytes).is_some() {
         return Vec::new();
     }
     let bytes = capture::plain(bytes);
@@ -164,8 +169,13 @@ impl WithParser for Decoding<'_> {
         let mut clock = Unwrapped::default();
         let pieces = capture::pieces(self.bytes);
         for (k, piece) in pieces.iter().enumerate() {
-            let Content::Bytes(bytes) = piece.content else {
-                continue;
+            let bytes = match piece.content {
+                Content::Bytes(bytes) => bytes,
+                Content::Zero(zero_cdeg) => {
+                    parser.set_zero(zero_cdeg);
+                    continue;
+                }
+                _ => continue,
             };
             if let Some(time_us) = piece.time_us {
                 parser.arrived(time_us as u32);

@@ -150,8 +150,8 @@ pub fn read(path: &Path) -> Result<Log> {
     read_with(path, &Options::default())
 }
 
-/// Reads a CARMEN text log, an `.lscan` file, a ROS 2 bag ([`ros`]) or a capture ([`capture`]), packed or not; the
-/// content tells which, and `options` what it does not tell.
+/// Reads a CARMEN text log, an `.lscan` file, a ROS 2 bag ([`ros`]), a capture ([`capture`]) or a board's telemetry, packed or
+/// not; the content tells which, and `options` what it does not tell.
 pub fn read_with(path: &Path, options: &Options) -> Result<Log> {
     let name = path.display().to_string();
     if path.is_dir() && options.lidar.is_none() {
@@ -195,6 +195,8 @@ pub fn parse(name: String, content: bytes::Content, options: &Options) -> Result
             }
             _ => ros::parse(bag, options),
         }
+    } else if let Some(bytes) = capture::telemetry::capture(&content.bytes) {
+        return capture::log::parse(&name, bytes::Content { bytes, cut }, "auto");
     } else {
         Ok(carmen::parse(&content.bytes))
     };

@@ -8,14 +8,14 @@ use anyhow::{Context as _, Result};
 use beamfix::geometry::{EgoMotion, Pose};
 use beamfix::grid::occupancy::{self, UpdateConfig};
 use beamfix::grid::{Grid, Shape};
-use beamfix::odometry::{OdometryConfig, Refusal};
+use beamfix::odometry::OdometryConfig;
 use beamfix::pipeline::{Estimator, Mapped, Mapper, Mapper64k, Mapper192k, Mapper512k, Tracker};
 use beamfix::scan::Scan;
 use beamfix::slam::{Counters, Merged, Placed, SLICE, Slam, SlamConfig};
 use beamfix_sim::Noise;
 
 use crate::formats::Log;
-use crate::pipeline::{config, follow};
+use crate::pipeline::{config, follow, is_measured};
 use crate::size;
 
 /// The memory configurations that map.
@@ -263,8 +263,7 @@ fn replay<
             online: pose,
             is_located: step.is_located,
             pose: step.odometry.pose,
-            is_measured: step.odometry.outcome.is_ok()
-                || step.odometry.keyframe && step.odometry.outcome == Err(Refusal::First),
+            is_measured: is_measured(&step.odometry),
         });
         Ok(())
     })?;

@@ -81,7 +81,7 @@ pub fn correspondence<const N: usize>(
     point: &ScanPoint,
     gate: f64,
 ) -> ([f64; 2], Option<[f64; 2]>) {
-    let [x, y] = metres_of(point.x, point.y);
+    let [x, y] = metres_of(point.x(), point.y());
     let at = TruePose::from(pose).then(TruePose::new(x, y, 0.0));
     let turn = libm::atan2(at.y, at.x) / core::f64::consts::TAU + 1.0;
     let index = (turn * N as f64 + 0.5) as usize % N.max(1);

@@ -3,7 +3,9 @@
 use anyhow::Result;
 use beamfix::geometry::{Point, Pose, Twist};
 use beamfix::lidar::Protocol;
-use beamfix::odometry::{Counters, Odometry, OdometryConfig, SparseConfig, SparseOdometry, Step};
+use beamfix::odometry::{
+    Counters, Odometry, OdometryConfig, Refusal, SparseConfig, SparseOdometry, Step,
+};
 use beamfix::pipeline::{Estimate, Estimator, Pipeline as Bytes, Revolution, Tracker};
 use beamfix::scan::{Beam, Mount};
 
@@ -15,6 +17,13 @@ use crate::size;
 
 /// What an estimator may look up between two scans (bytes): a fifth of a second of an M4F at 168 MHz.
 const BUDGET: u32 = 10_000_000;
+
+/// Whether a pose is more than a guess: a match confirms it, or it is the first reference's. A scan before that, which could become
+/// none, has no pose of its own.
+#[must_use]
+pub fn is_measured(step: &Step) -> bool {
+    step.outcome.is_ok() || step.keyframe && step.outcome == Err(Refusal::First)
+}
 
 /// The odometry's settings for a lidar that sits on the robot like this, with so many directions.
 #[must_use]
@@ -213,6 +222,7 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pieces<E, N> for Bytes<P, E, 
                     ready(revolution);
                 });
             }
+            (Content::Zero(zero_cdeg), _) => self.lidar_mut().set_zero(zero_cdeg),
             (Content::Wheels(pose), Some(time_us)) if ego => {
                 self.tracker_mut().push_wheels(time_us, pose);
             }

@@ -67,13 +67,9 @@ impl<W: Write> Watch<W> {
         if let Some(qualities) = &mut qualities {
             writeln!(qualities, "{QUALITY_COLUMNS}")?;
         }
-        let mut recorder = recording.map(Recorder::new).transpose()?;
-        if let Some(recorder) = &mut recorder {
-            recorder.push(0, Content::Lidar("ld06"))?;
-        }
         Ok(Self {
             receiver: Receiver::new(),
-            recorder,
+            recorder: recording.map(Recorder::new).transpose()?,
             qualities,
             starts: 0,
             ready: None,
@@ -138,6 +134,14 @@ impl<W: Write> Watch<W> {
                     // It starts from the origin again, and so may its clock.
                     self.pose = None;
                     self.pose_clock = Unwrapped::default();
+                }
+                // Once: whoever is asked again says the same.
+                if let Some(recorder) = &mut self.recorder
+                    && self.ready.is_none()
+                {
+                    for content in telemetry::setup(&ready) {
+                        recorder.push(0, content)?;
+                    }
                 }
                 self.ready = Some(ready);
             }

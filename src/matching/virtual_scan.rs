@@ -261,7 +261,7 @@ impl Bin {
         let range = (self.range + count / 2).checked_div(count)?;
         let off = self.bearing.checked_div(count as i32)?;
         let bearing = Bearing(middle.wrapping_add(off as u16));
-        Some(ScanPoint::at(bearing, range as u16))
+        Some(ScanPoint::within(bearing, range as u16))
     }
 }
 

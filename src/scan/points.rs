@@ -181,7 +181,7 @@ impl Sweep {
     ) {
         // In two's complement the negative is all bits flipped, and one more.
         let bearing = (bearing ^ self.flip).wrapping_add(self.flip & 1);
-        let point = ScanPoint::at(Bearing(bearing), range);
+        let point = ScanPoint::within(Bearing(bearing), range);
         let moved = match &self.deskew {
             Some(deskew) => deskew.apply(point, u32::from(self.last.saturating_sub(age)) << 4),
             None => Some(point),

@@ -74,7 +74,7 @@ impl<const B: usize> PackedScan<B> {
             let off = (place * u64::from(self.width())).checked_div(2 * sixteenths);
             let bearing = self.first.wrapping_add(off.unwrap_or(0) as u16);
             // As many points as directions at most: it fits.
-            let _ = points.push(ScanPoint::at(Bearing(bearing), range.min(32_000)));
+            let _ = points.push(ScanPoint::at(Bearing(bearing), range));
         }
     }
 

@@ -142,6 +142,11 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
         self.report.set_time(now_us);
     }
 
+    /// Takes the angle (0.01°) that looks forward by the lidar's own calibration, in place of its model's.
+    pub fn set_zero(&mut self, zero_cdeg: u16) {
+        self.pipeline.lidar_mut().set_zero(zero_cdeg);
+    }
+
     /// What is due by the clock alone, lidar or not: gives what to send, most often nothing. To be called about every
     /// [`run::TICK_US`], after [`App::set_time`].
     pub fn tick(&mut self) -> &[u8] {

@@ -127,6 +127,11 @@ fn go_round<
                 Wanted::SetBaud(baud) => hardware.set_lidar_baud(baud),
             }
         }
+        if H::ASKS
+            && let Some(zero_cdeg) = starter.zero_cdeg()
+        {
+            app.set_zero(zero_cdeg);
+        }
     }
     app.set_bytes_lost(lidar.lost());
     // A piece of each in turn, the lidar's first: a flood of commands takes no more than its share of the time.

@@ -86,6 +86,12 @@ impl Starter {
         }
     }
 
+    /// The angle that looks forward by the lidar's own calibration (0.01°), once it has started and where it told one.
+    #[must_use]
+    pub fn zero_cdeg(&self) -> Option<u16> {
+        self.startup.zero_cdeg().filter(|_| self.is_ready)
+    }
+
     /// Takes what the supervisor saw, and says what it means of a lidar from which no revolutions come.
     pub fn look(&mut self, now_us: u32, care: &mut Care) {
         if self.model.start == Start::Listen {

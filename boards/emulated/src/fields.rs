@@ -95,7 +95,7 @@ impl Fields {
             out(&[score.sum, machine.instructions()])?;
             self.indices.clear();
             for point in &self.points {
-                let _ = self.indices.push(u32::from(point.bearing.0) * 3000 >> 16);
+                let _ = self.indices.push(u32::from(point.bearing().0) * 3000 >> 16);
             }
             machine.restart();
             let sums = sum_four(field.grid().cells(), &self.indices);

@@ -155,8 +155,8 @@ fn beams(points: &[ScanPoint], pose: Pose) -> f32 {
     let mut learner = Learner::new(model);
     let mut sum = 0;
     for point in points {
-        sum += table.log_likelihood(Some(point.range), 1000);
-        learner.add(Some(f32::from(point.range) * 1e-3), pose.y);
+        sum += table.log_likelihood(Some(point.range()), 1000);
+        learner.add(Some(f32::from(point.range()) * 1e-3), pose.y);
     }
     learner.forget(0.5);
     sum as f32 + learner.model().likelihood(None, pose.y)

@@ -6,13 +6,13 @@ use anyhow::Context as _;
 use beamfix::geometry::Pose;
 use beamfix::localization::LocalizerConfig;
 use beamfix::matching::correlative::pyramid::Pyramid;
-use beamfix::odometry::{self as library, Refusal};
-use beamfix::pipeline::{Estimate as _, MapLocalizer, Verdict};
+use beamfix::odometry as library;
+use beamfix::pipeline::{Estimate as _, Estimator, MapLocalizer, Verdict};
 use beamfix::scan::PointsConfig;
 use host_tests::formats::field::FieldFile;
 use host_tests::formats::order::Order;
 use host_tests::formats::{self, Options};
-use host_tests::pipeline::{Followed, config, follow};
+use host_tests::pipeline::{Followed, config, follow, is_measured, sparse_odometry};
 use host_tests::{size, sized};
 use numpy::{PyArray1, PyArray2};
 use pyo3::{
@@ -217,10 +217,11 @@ pub fn replay(
         start,
     };
     let followed = py.detach(|| {
-        if how.map.is_some() {
-            sized!(directions, localized(&how))
-        } else {
-            sized!(directions, tracked(&how))
+        let width = size::beam_width(how.log.scans.iter().map(|scan| &scan.beams[..]));
+        match (how.map, width) {
+            (Some(_), _) => sized!(directions, localized(&how)),
+            (None, Some(width)) => followed(&how, sparse_odometry(how.log.mount, width), |_| 0),
+            (None, None) => sized!(directions, tracked(&how)),
         }
     });
     let followed = followed.map_err(failed)?;
@@ -248,17 +249,25 @@ pub fn replay(
 }
 
 fn tracked<const N: usize>(how: &Replay<'_>) -> anyhow::Result<Followed<Poses>> {
-    let mut poses = Poses::default();
     let odometry = library::Odometry::<N>::new(config(how.log.mount, how.directions));
+    followed(how, odometry, |odometry| odometry.counters().lost)
+}
+
+/// Replays through an odometry; `lost` counts the keyframes that it has given up.
+fn followed<E: Estimator<N, Step = library::Step>, const N: usize>(
+    how: &Replay<'_>,
+    odometry: E,
+    lost: impl Fn(&E) -> u32,
+) -> anyhow::Result<Followed<Poses>> {
+    let mut poses = Poses::default();
     let ego = (how.scans, how.uses_wheels);
     let followed = follow(how.log, ego, odometry, &mut |_, pose, step| {
-        let is_first = step.keyframe && step.outcome == Err(Refusal::First);
         poses.rows.push(pose);
-        poses.measured.push(step.outcome.is_ok() || is_first);
+        poses.measured.push(is_measured(step));
+        poses.keyframes += u32::from(step.keyframe);
         Ok(())
     })?;
-    let counters = followed.estimator.counters();
-    (poses.keyframes, poses.lost) = (counters.keyframes, counters.lost);
+    poses.lost = lost(&followed.estimator);
     Ok(followed.map(|_| poses))
 }
 

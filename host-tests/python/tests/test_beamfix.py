@@ -104,24 +104,37 @@ def test_bytes_are_decoded_as_the_tool_does(tmp_path):
     assert "ld06" in beamfix.lidars()
 
 
-def logs():
-    names = ["datasets/logs/intel.log.gz", "datasets/logs/fr079.log.gz", "datasets/lowcost/slambot-6aug14.log.gz"]
-    return [SHARED / name for name in names]
-
-
-@pytest.mark.parametrize("log", logs(), ids=lambda log: log.name)
-def test_a_log_gives_the_tools_poses_to_the_last_bit(log):
-    if not log.exists():
-        pytest.skip(f"{log.name} is not there")
+def same_as_the_tool(log, **options):
+    """Replays a log both ways, with its wheels and without."""
+    given = [word for name, value in options.items() for word in (f"--{name}", value)]
     for prior in ("odometry", "none"):
-        told = tool("replay", str(log), "--scans", "800", "--prior", prior)
-        found = beamfix.replay(log, scans=800, prior=prior)
-        assert found.pose_hash == told["pose_hash"] and len(found) == told["scans"]
+        told = tool("replay", str(log), "--scans", "800", "--prior", prior, *given)
+        found = beamfix.replay(log, scans=800, prior=prior, **options)
+        assert found.pose_hash == told["pose_hash"] and len(found) == told["scans"] > 20
         assert int((~found.measured).sum()) == told["refused"]
+        assert (found.keyframes, found.lost) == (told["keyframes"], told["lost"])
+
+
+# Recorded by others: CARMEN text of a SICK with 1 and 0.5 degrees, the binary log of an RPLIDAR, the raw bytes of an LD19, a ROS 2 bag.
+@pytest.mark.parametrize("log, lidar", [
+    ("datasets/logs/intel.log.gz", None), ("datasets/logs/fr079.log.gz", None), ("datasets/lowcost/slambot-6aug14.lscan", None),
+    ("datasets/serial/ld19-20240828.bin", "ld19"), ("faults/clockwise-as-drivers.mcap.gz", None),
+])
+def test_a_recorded_log_gives_the_tools_poses_to_the_last_bit(log, lidar):
+    if not (SHARED / log).exists():
+        pytest.skip(f"{log} is not there")
+    same_as_the_tool(SHARED / log, **({"lidar": lidar} if lidar else {}))
+
+
+# The bytes of a lidar that turns with their times, the text of a ring of rangers, a ROS 2 bag.
+@pytest.mark.parametrize("log, lidar", [("lidar.rec", "ld06"), ("ring.log", "vl53l5cx-ring"), ("bag", "xv11")])
+def test_a_simulated_log_gives_the_tools_poses_to_the_last_bit(log, lidar, tmp_path):
+    tool("simulate", "--seconds", "8", "--lidar", lidar, "--recording-format", "ros2", "--out", str(tmp_path))
+    same_as_the_tool(tmp_path / log)
 
 
 def test_scans_of_a_log_through_the_odometry_are_the_replay():
-    log = logs()[0]
+    log = SHARED / "datasets/logs/intel.log.gz"
     if not log.exists():
         pytest.skip(f"{log.name} is not there")
     read = beamfix.read_log(log)

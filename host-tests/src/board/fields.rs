@@ -167,7 +167,7 @@ fn on_host(scene: &Scene) -> Result<[u32; 8]> {
     let indices: Vec<u32> = scene
         .points
         .iter()
-        .map(|point| (u32::from(point.bearing.0) * 3000) >> 16)
+        .map(|point| (u32::from(point.bearing().0) * 3000) >> 16)
         .collect();
     let fours = sum_four(field.grid().cells(), &indices).iter().sum();
     Ok([score.sum, fours, x, y, t, sx, sy, st])
@@ -182,8 +182,8 @@ fn input(scene: &Scene) -> Vec<u8> {
     bytes.extend([x, y, theta].into_iter().flat_map(f32::to_le_bytes));
     bytes.extend((scene.points.len() as u32).to_le_bytes());
     for point in &scene.points {
-        bytes.extend(point.bearing.0.to_le_bytes());
-        bytes.extend(point.range.to_le_bytes());
+        bytes.extend(point.bearing().0.to_le_bytes());
+        bytes.extend(point.range().to_le_bytes());
     }
     bytes
 }

@@ -208,8 +208,8 @@ fn input(scene: &Scene) -> Vec<u8> {
         bytes.extend([x, y, theta].into_iter().flat_map(f32::to_le_bytes));
         bytes.extend((points.len() as u32).to_le_bytes());
         for point in points {
-            bytes.extend(point.bearing.0.to_le_bytes());
-            bytes.extend(point.range.to_le_bytes());
+            bytes.extend(point.bearing().0.to_le_bytes());
+            bytes.extend(point.range().to_le_bytes());
         }
     }
     bytes

@@ -71,7 +71,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         .collect();
     ensure!(
         summary.packets > 0,
-        "{name}: no packet of an {} in {} bytes; {} failed their check: {}",
+        "{name}: no packet of the lidar {} in {} bytes; {} failed their check: {}",
         model.name,
         bytes.len(),
         summary.check_errors,

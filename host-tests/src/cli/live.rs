@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail, ensure};
 use beamfix::geometry::Pose;
 use beamfix::lidar::{Model, Protocol};
-use beamfix::odometry::{Odometry, Refusal};
+use beamfix::odometry::Odometry;
 use beamfix::pipeline::{Pipeline, Revolution};
 use beamfix::scan::{Beam, Mount};
 use beamfix_sim::TruePose;
@@ -17,7 +17,7 @@ use host_tests::bringup;
 use host_tests::decode::{WithParser, with_parser};
 use host_tests::formats::capture::{Content, Piece, Recorder};
 use host_tests::formats::mount;
-use host_tests::pipeline::{Pieces, config};
+use host_tests::pipeline::{Pieces, config, is_measured};
 use host_tests::report::hash::PoseHash;
 use host_tests::report::terminal::View;
 use host_tests::report::track::{At, Elapsed, Track};
@@ -78,8 +78,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let mut port = bringup::open(&args.port, args.baud.unwrap_or(230_400))?;
     let model = bringup::start(port.as_mut(), &args.lidar, args.baud)?;
+    let zero = match Model::named(model.name) {
+        Some(row) if row.zero_cdeg != model.zero_cdeg => format!(
+            ", {:.2}° of its own look forward, by the unit",
+            f64::from(model.zero_cdeg) / 100.0
+        ),
+        _ => String::new(),
+    };
     output::remark(&[format!(
-        "{}: {} at {} bits/s",
+        "{}: {} at {} bits/s{zero}",
         args.port, model.name, model.baud
     )]);
     let directions = size::of_model(&model);
@@ -153,7 +160,10 @@ impl<'a> Live<'a> {
         let mount = args.mount.unwrap_or(Mount::DEFAULT);
         if let Some(recorder) = &mut recorder {
             recorder.push(0, Content::Lidar(model.name))?;
-            recorder.push(0, Content::Mount(mount.robot_from_lidar))?;
+            recorder.push(0, Content::Mount(mount))?;
+            if Model::named(model.name).is_some_and(|row| row.zero_cdeg != model.zero_cdeg) {
+                recorder.push(0, Content::Zero(model.zero_cdeg))?;
+            }
         }
         let odometry = Odometry::new(config(mount, directions));
         let track = Track::new(TruePose::default(), mount.robot_from_lidar, DRAWN);
@@ -247,8 +257,7 @@ impl Seen {
             return;
         }
         let step = revolution.step;
-        let is_first = step.keyframe && step.outcome == Err(Refusal::First);
-        let is_measured = step.outcome.is_ok() || is_first;
+        let is_measured = is_measured(step);
         self.scans += 1;
         self.refused += usize::from(!is_measured);
         self.keyframes += usize::from(step.keyframe);

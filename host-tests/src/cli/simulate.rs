@@ -9,7 +9,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use beamfix::geometry::Pose;
 use beamfix::grid::occupancy;
 use beamfix::lidar::Model;
-use beamfix::odometry::{Odometry, Refusal, Step};
+use beamfix::odometry::{Odometry, Step};
 use beamfix::pipeline::Estimator;
 use beamfix::scan::Mount;
 use beamfix_sim::encoder;
@@ -23,7 +23,7 @@ use host_tests::formats::capture::{log, simulated};
 use host_tests::formats::carmen;
 use host_tests::formats::ros::bag::ATTACHMENT;
 use host_tests::formats::{Log, ros_map};
-use host_tests::pipeline::{config, follow, sparse_odometry};
+use host_tests::pipeline::{config, follow, is_measured, sparse_odometry};
 use host_tests::report::run::{Run, Setup, Titles};
 use host_tests::{size, sized};
 use serde_json::json;
@@ -302,7 +302,8 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
         estimator,
         &mut |scan, pose, step| {
             let now = at_end.next().context("a moment for each scan")?;
-            refused += u32::from(!matches!(step.outcome, Ok(_) | Err(Refusal::First)));
+            let is_measured = is_measured(step);
+            refused += u32::from(!is_measured);
             keyframes += u32::from(step.keyframe);
             let true_pose: Pose = origin.truth.between(now.truth).into();
             let wheels: Pose = origin.wheels.between(now.wheels).into();
@@ -310,7 +311,7 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
                 time: now.time,
                 estimate: pose,
                 covariance: Some(step.covariance),
-                is_measured: matches!(step.outcome, Ok(_) | Err(Refusal::First)),
+                is_measured,
                 truth: Some(true_pose),
                 wheels: Some(wheels),
             };

@@ -5,13 +5,13 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use beamfix::geometry::Pose;
 use beamfix::lidar::Model;
-use beamfix::odometry::{Odometry, Refusal};
+use beamfix::odometry::Odometry;
 use beamfix::scan::Mount;
 use beamfix_sim::Settings;
 use beamfix_sim::place::{self, Place};
 use host_tests::decode;
 use host_tests::formats::capture::simulated;
-use host_tests::pipeline::{config, follow};
+use host_tests::pipeline::{config, follow, is_measured};
 use host_tests::report::scene::Outcome;
 use host_tests::sized;
 use serde_json::{Value, json};
@@ -126,7 +126,7 @@ fn follow_one<const N: usize>(settings: &Settings, driven: &Driven) -> Result<Ou
         &mut |_, _: Pose, step| {
             let now = moments.next().context("a moment for each scan")?;
             outcome.push(now.time, step, origin.between(now.truth));
-            outcome.refused += u32::from(!matches!(step.outcome, Ok(_) | Err(Refusal::First)));
+            outcome.refused += u32::from(!is_measured(step));
             Ok(())
         },
     )?;

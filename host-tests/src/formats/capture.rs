@@ -8,9 +8,18 @@
 //! | 8 | `BYTES+T2` |
 //! | | then pieces: |
 //! | 8 | time (µs), `u64` |
-//! | 1 | what it is: 0 bytes of the lidar, 1 wheels, 2 name of the lidar, 3 the lidar's place on the robot, 4 gyroscope |
+//! | 1 | what it is |
 //! | 4 | length of the rest, `u32` |
-//! | … | bytes; x, y (m), heading (rad) as three `f32`; text; three `f32` again; rate of turn (rad/s) as `f32` |
+//! | … | the rest |
+//!
+//! | what | the rest |
+//! | --- | --- |
+//! | 0 bytes of the lidar | as they came |
+//! | 1 wheels | x, y (m), heading (rad) as three `f32` |
+//! | 2 the lidar's model | its name as text |
+//! | 3 the lidar on the robot | x, y (m), heading (rad) as three `f32`; 1 if it hangs head down, else 0, or nothing |
+//! | 4 gyroscope | rate of turn (rad/s) as `f32` |
+//! | 5 the lidar's own angle that looks forward, where the unit told another than its model's | 0.01° as `u16` |
 //!
 //! All little-endian, on one clock. Pieces of other kinds are skipped. A file
 //! without this start is bytes of the lidar alone.
@@ -23,6 +32,7 @@ use std::borrow::Cow;
 use std::io::{self, Write};
 
 use beamfix::geometry::Pose;
+use beamfix::scan::Mount;
 
 /// How such a file starts.
 pub const MAGIC: &[u8; 8] = b"BYTES+T2";
@@ -47,8 +57,10 @@ pub enum Content<'a> {
     Gyro(f32),
     /// Which lidar it is.
     Lidar(&'a str),
-    /// The lidar's pose on the robot.
-    Mount(Pose),
+    /// How the lidar sits on the robot.
+    Mount(Mount),
+    /// The lidar's own angle that looks forward (0.01°), where the unit told another than its model's.
+    Zero(u16),
 }
 
 /// Writes a capture piece by piece.
@@ -66,16 +78,21 @@ impl<W: Write> Recorder<W> {
 
     /// Appends what came in at this time (µs).
     pub fn push(&mut self, time_us: u64, content: Content) -> io::Result<()> {
-        let pose = |pose: Pose| {
+        let pose = |pose: Pose| -> Vec<u8> {
             let numbers = [pose.x, pose.y, pose.theta];
-            Cow::Owned(numbers.into_iter().flat_map(f32::to_le_bytes).collect())
+            numbers.into_iter().flat_map(f32::to_le_bytes).collect()
         };
         let (kind, payload): (u8, Cow<[u8]>) = match content {
             Content::Bytes(bytes) => (0, Cow::Borrowed(bytes)),
-            Content::Wheels(wheels) => (1, pose(wheels)),
+            Content::Wheels(wheels) => (1, Cow::Owned(pose(wheels))),
             Content::Lidar(name) => (2, Cow::Borrowed(name.as_bytes())),
-            Content::Mount(mount) => (3, pose(mount)),
+            Content::Mount(mount) => {
+                let mut bytes = pose(mount.robot_from_lidar);
+                bytes.push(mount.upside_down.into());
+                (3, Cow::Owned(bytes))
+            }
             Content::Gyro(rate) => (4, Cow::Owned(rate.to_le_bytes().to_vec())),
+            Content::Zero(zero_cdeg) => (5, Cow::Owned(zero_cdeg.to_le_bytes().to_vec())),
         };
         let length = u32::try_from(payload.len()).map_err(io::Error::other)?;
         self.output.write_all(&time_us.to_le_bytes())?;
@@ -122,8 +139,9 @@ pub fn pieces(file: &[u8]) -> Vec<Piece<'_>> {
             0 => Some(Content::Bytes(payload)),
             1 => pose(payload).map(Content::Wheels),
             2 => std::str::from_utf8(payload).ok().map(Content::Lidar),
-            3 => pose(payload).map(Content::Mount),
+            3 => mount(payload).map(Content::Mount),
             4 => rate(payload).map(Content::Gyro),
+            5 => zero(payload).map(Content::Zero),
             _ => None,
         };
         pieces.extend(content.map(|content| Piece {
@@ -172,6 +190,18 @@ fn pose(payload: &[u8]) -> Option<Pose> {
     }
 }
 
+fn mount(payload: &[u8]) -> Option<Mount> {
+    Some(Mount {
+        robot_from_lidar: pose(payload)?,
+        // A file from before this was written has only the pose.
+        upside_down: payload.get(12) == Some(&1),
+    })
+}
+
+fn zero(payload: &[u8]) -> Option<u16> {
+    payload.try_into().ok().map(u16::from_le_bytes)
+}
+
 fn rate(payload: &[u8]) -> Option<f32> {
     let rate = f32::from_le_bytes(payload.try_into().ok()?);
     rate.is_finite().then_some(rate)
@@ -205,11 +235,38 @@ pub fn lidar(file: &[u8]) -> Option<&str> {
 mod tests {
     use super::*;
 
+    const MOUNT: Mount = Mount {
+        robot_from_lidar: Pose {
+            x: 0.1,
+            y: -0.2,
+            theta: 3.0,
+        },
+        upside_down: true,
+    };
+
+    /// Of files from before the head-down lidar, which end a byte earlier.
+    #[test]
+    fn a_mount_without_its_sense_is_upright() {
+        let mut recorder = Recorder::new(Vec::new()).expect("memory");
+        recorder.push(0, Content::Mount(MOUNT)).expect("memory");
+        let mut file = recorder.finish().expect("memory");
+        file.pop();
+        file[17] -= 1;
+        let upright = Mount {
+            upside_down: false,
+            ..MOUNT
+        };
+        assert!(
+            matches!(pieces(&file)[..], [Piece { content: Content::Mount(mount), .. }] if mount == upright)
+        );
+    }
+
     #[test]
     fn what_is_recorded_comes_back() {
         let contents = [
             (0, Content::Lidar("xv11")),
-            (0, Content::Mount(Pose::new(0.1, -0.2, 3.0))),
+            (0, Content::Mount(MOUNT)),
+            (0, Content::Zero(35_850)),
             (5, Content::Bytes(&[1, 2, 3])),
             (1 << 40, Content::Bytes(&[])),
             (7, Content::Wheels(Pose::new(1.5, f32::MIN_POSITIVE, -3.1))),

@@ -72,7 +72,7 @@ pub fn what_it_is(name: &str, bytes: &[u8], lines: usize) -> String {
     if let Some(finding) = identify::identify(bytes) {
         let model = finding.model.name;
         return format!(
-            "it is raw bytes of a lidar, by their look an {model}: beamfix replay {name} --lidar {model}"
+            "it is raw bytes of a lidar, by their look of the lidar {model}: beamfix replay {name} --lidar {model}"
         );
     }
     if is_text {

@@ -37,6 +37,8 @@ const ROUND_US: u32 = 125;
 const ROOM: [f64; 2] = [4.0, 3.0];
 /// Middle and radius of a pillar in it (m).
 const PILLAR: ([f64; 2], f64) = ([2.9, 1.9], 0.25);
+/// What a unit that keeps its zero adds to its angles (0.25°).
+const ADDED: i32 = 365;
 /// Where the robot starts in it.
 const START: TruePose = TruePose::new(1.3, 1.2, 0.3);
 
@@ -158,7 +160,7 @@ impl Unit {
             }
             [0xa5, 0x50 | 0x90] => answer(4, &info, false),
             [0xa5, 0x52 | 0x91 | 0x92] => answer(6, &[0, 0, 0], false),
-            [0xa5, 0x93] => answer(4, &[0; 4], false),
+            [0xa5, 0x93] => answer(4, &ADDED.to_le_bytes(), false),
             [0xa5, 0x84, _, 0x7c, ..] if has_modes => conf(0x7c, &[0, 0]),
             [0xa5, 0x84, _, 0x75, 0, 0, 0, mode, ..] if has_modes => {
                 conf(0x75, &[if mode == 1 { kind } else { 0x81 }])
@@ -249,7 +251,12 @@ impl Unit {
             if !turns {
                 self.began_us = now_us.saturating_sub(encoder.next_time_us() as u64);
             }
-            let mut look = |_: f64, bearing: f64| see(self.robot, bearing);
+            // The angles of a unit with a zero of its own are to be added to, clockwise.
+            let turned = match self.model.start {
+                Start::Ydlidar { keeps_zero: true } => f64::from(ADDED).to_radians() / 4.0,
+                _ => 0.0,
+            };
+            let mut look = |_: f64, bearing: f64| see(self.robot, bearing - turned);
             while self.began_us as f64 + encoder.next_time_us() <= now_us as f64 {
                 let mut bytes = Vec::new();
                 encoder.fire(&mut look, &mut bytes);

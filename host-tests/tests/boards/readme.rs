@@ -127,6 +127,73 @@ fn the_buffer_of_a_uart_is_that_of_the_longest_match() {
     has("`boards/` have rings of 4096 bytes");
 }
 
+/// Figures of the README's text, in order, and which test holds each down. Rows of tables and code have tests of their own here, in
+/// `tiers` and in `maps::slam::recorded`.
+const FIGURES: [(&str, &str); 14] = [
+    ("2", "a kit's name: Pico 2"),
+    (
+        "1.0 0.7 0.7 1",
+        "releases_and_sizes_are_those_of_the_manifest_and_the_compiler",
+    ),
+    (
+        "23040 230 400 1076 323 4096",
+        "the_buffer_of_a_uart_is_that_of_the_longest_match",
+    ),
+    (
+        "20 2",
+        "assumptions_are_those_that_the_cards_are_reckoned_with",
+    ),
+    (
+        "1.25 1.5 10 600 1250",
+        "assumptions_are_those_that_the_cards_are_reckoned_with",
+    ),
+    ("1024", "a unit"),
+    ("64k", "an option"),
+    ("2009", "a year"),
+    ("64k", "an option"),
+    (
+        "5 5° 10 15° 20 30° 40 45° 5 1°",
+        "the_table_of_accuracy_is_of_these_guesses",
+    ),
+    ("2026", "a year"),
+    ("2", "a name: ROS 2"),
+    (
+        "0",
+        "tool::recordings::a_replay_without_a_pose_is_no_success_and_marks_its_guesses",
+    ),
+    ("6x4", "an option"),
+];
+
+#[test]
+fn no_figure_of_the_text_is_without_a_test() {
+    let mut is_code = false;
+    let text = README.lines().filter(|line| {
+        let is_fence = line.starts_with("```");
+        is_code ^= is_fence;
+        !(is_code || is_fence || line.starts_with('|') || line.starts_with("<!--"))
+    });
+    let found: Vec<&str> = text
+        .flat_map(|line| line.split(|c: char| c.is_whitespace() || "/()[],;`:".contains(c)))
+        .map(|word| word.trim_matches(['.', '±']))
+        .filter(|word| word.starts_with(|c: char| c.is_ascii_digit()))
+        .collect();
+    let known: Vec<&str> = FIGURES
+        .iter()
+        .flat_map(|(figures, _)| figures.split(' '))
+        .collect();
+    assert_eq!(
+        found, known,
+        "a figure wants a test, and a place in FIGURES"
+    );
+    let own = include_str!("readme.rs");
+    for (_, test) in FIGURES {
+        assert!(
+            test.contains([' ', ':']) || own.contains(&format!("fn {test}(")),
+            "{test}"
+        );
+    }
+}
+
 /// The traits that a HAL's UART has, by the lock file of a firmware with it.
 fn traits_of(lock: &str, hal: &str) -> (String, [Vec<String>; 3]) {
     let package = |name: &str| {

@@ -153,9 +153,9 @@ fn a_dock_is_found_where_it_stands_and_nowhere_else() {
         // Where something stands, looking at the lidar: the hardest guess.
         let target = points[noise.even(0.0, points.len() as f64) as usize];
         let guess = Pose::new(
-            f32::from(target.x) * 1e-3,
-            f32::from(target.y) * 1e-3,
-            core::f32::consts::PI + target.bearing.radians() + noise.even(-0.5, 0.5) as f32,
+            f32::from(target.x()) * 1e-3,
+            f32::from(target.y()) * 1e-3,
+            core::f32::consts::PI + target.bearing().radians() + noise.even(-0.5, 0.5) as f32,
         );
         tried += 1;
         let seen = presence::find(&mut correlator, &pyramid, &faces, &points, guess, &config);

@@ -87,9 +87,9 @@ proptest! {
 fn turned(points: &[ScanPoint], by: u16) -> Vec<ScanPoint> {
     let mut points: Vec<ScanPoint> = points
         .iter()
-        .map(|p| ScanPoint::at(Bearing(p.bearing.0.wrapping_sub(by)), p.range))
+        .map(|p| ScanPoint::at(Bearing(p.bearing().0.wrapping_sub(by)), p.range()))
         .collect();
-    points.sort_by_key(|p| p.bearing.0);
+    points.sort_by_key(|p| p.bearing().0);
     points
 }
 
@@ -97,9 +97,9 @@ fn turned(points: &[ScanPoint], by: u16) -> Vec<ScanPoint> {
 fn mirrored(points: &[ScanPoint]) -> Vec<ScanPoint> {
     let mut points: Vec<ScanPoint> = points
         .iter()
-        .map(|p| ScanPoint::at(Bearing(p.bearing.0.wrapping_neg()), p.range))
+        .map(|p| ScanPoint::at(Bearing(p.bearing().0.wrapping_neg()), p.range()))
         .collect();
-    points.sort_by_key(|p| p.bearing.0);
+    points.sort_by_key(|p| p.bearing().0);
     points
 }
 

@@ -64,7 +64,7 @@ fn scan<const N: usize>(pose: Pose, scale: f32, sigma: f32, noise: &mut Noise) -
 fn mirrored<const N: usize>(points: &[ScanPoint; N]) -> [ScanPoint; N] {
     core::array::from_fn(|k| {
         let point = points[N - 1 - k];
-        ScanPoint::at(Bearing(point.bearing.0.wrapping_neg()), point.range)
+        ScanPoint::at(Bearing(point.bearing().0.wrapping_neg()), point.range())
     })
 }
 

@@ -7,6 +7,7 @@ mod converged;
 mod correlative;
 mod degenerate;
 mod every_match;
+mod extremes;
 mod field;
 mod host_cost;
 mod staged;

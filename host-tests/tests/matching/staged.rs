@@ -393,8 +393,8 @@ fn trimming_estimates_the_overlap() {
             let mut noise = Noise::new(seed, 2);
             let kept = (share * current.len() as f64) as usize;
             for point in current.iter_mut().skip(kept) {
-                let nearer = f64::from(point.range) * noise.even(0.3, 0.8);
-                *point = ScanPoint::at(point.bearing, nearer as u16);
+                let nearer = f64::from(point.range()) * noise.even(0.3, 0.8);
+                *point = ScanPoint::at(point.bearing(), nearer as u16);
             }
             let mut stages = Stages {
                 selection: All,

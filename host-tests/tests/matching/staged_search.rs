@@ -66,17 +66,17 @@ fn random_place(points: &[ScanPoint], noise: &mut Noise) -> Place {
             y: around(noise, 40_000.0),
         },
         1 => Place {
-            x: i32::from(a.x),
-            y: i32::from(a.y),
+            x: i32::from(a.x()),
+            y: i32::from(a.y()),
         },
         2 => Place {
-            x: (i32::from(a.x) + i32::from(b.x)) / 2,
-            y: (i32::from(a.y) + i32::from(b.y)) / 2,
+            x: (i32::from(a.x()) + i32::from(b.x())) / 2,
+            y: (i32::from(a.y()) + i32::from(b.y())) / 2,
         },
         3 => Place { x: 0, y: 0 },
         _ => Place {
-            x: i32::from(a.x) + around(noise, 300.0),
-            y: i32::from(a.y) + around(noise, 300.0),
+            x: i32::from(a.x()) + around(noise, 300.0),
+            y: i32::from(a.y()) + around(noise, 300.0),
         },
     }
 }
@@ -137,8 +137,8 @@ fn the_walk_looks_at_few_points_where_the_guess_is_good() {
     let asked = Cell::new(0u32);
     for (k, point) in points.iter().enumerate() {
         let place = Place {
-            x: i32::from(point.x) + 30,
-            y: i32::from(point.y) - 30,
+            x: i32::from(point.x()) + 30,
+            y: i32::from(point.y()) - 30,
         };
         let found = sweep.nearest(&points, place, k, |_| {
             asked.set(asked.get() + 1);

@@ -49,12 +49,12 @@ fn the_virtual_scan_is_what_the_lidar_would_see() {
         let frames = keyframes(&world, place, 0.3, &mut noise);
         let scan = virtual_scan(Pose::IDENTITY, &frames);
         for point in scan.as_slice() {
-            let direction = place.theta + f64::from(point.bearing.radians());
+            let direction = place.theta + f64::from(point.bearing().radians());
             let towards = [libm::cos(direction), libm::sin(direction)];
             let Some(truth) = world.cast([place.x, place.y], towards) else {
                 continue;
             };
-            let error = f64::from(point.range) * 1e-3 - truth;
+            let error = f64::from(point.range()) * 1e-3 - truth;
             seen += 1;
             if error.abs() < 0.05 {
                 near += 1;

@@ -19,6 +19,9 @@ struct Answers<'a> {
     scan: Option<&'a [u8]>,
 }
 
+/// What a unit of YDLIDAR's G2 adds to its angles by its own calibration (0.25°).
+const ADDED: i32 = -37;
+
 /// Plays a lidar until nobody listens any more: answers, and sends what it measures at its own pace. Gives the requests.
 fn play(mut line: TTYPort, model: &'static Model, answers: &Answers<'_>) -> Vec<u8> {
     let settings = Settings {
@@ -95,6 +98,7 @@ fn follow(
         said["pose_hash"], replayed["pose_hash"],
         "{said} {replayed}"
     );
+    assert_eq!(said["lidar"], replayed["lidar"]);
     (
         said,
         asked,
@@ -151,6 +155,48 @@ fn a_lidar_that_is_asked_as_an_rplidar_is_read_as_what_it_is() {
     assert!(asked.ends_with(&[0xa5, 0x60]), "{asked:x?}");
     assert_eq!(said["scans"], 25, "{said}");
     assert_eq!(said["refused"], 0, "{said}");
+}
+
+/// Its zero looks elsewhere than a G2's: by 9.25°, in `live`, in what is recorded and in what is decoded.
+#[test]
+fn the_zero_that_a_unit_keeps_is_asked_for_applied_and_recorded() {
+    static ASKED: Answers<'static> = Answers {
+        answers: &[
+            (
+                &[0xa5, 0x90],
+                &[
+                    0xa5, 0x5a, 20, 0, 0, 0, 4, 100, 1, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+                    0, 0, 0, 0,
+                ],
+            ),
+            (&[0xa5, 0x91], &[0xa5, 0x5a, 3, 0, 0, 0, 6, 0, 0, 0]),
+            (
+                &[0xa5, 0x93],
+                &[0xa5, 0x5a, 4, 0, 0, 0, 4, ADDED as u8, 0xff, 0xff, 0xff],
+            ),
+            (&[0xa5, 0x60], &[0xa5, 0x5a, 5, 0, 0, 0x40, 0x81]),
+        ],
+        scan: Some(&[0xa5, 0x60]),
+    };
+    let model = &Model::YDLIDAR_G2;
+    let (said, asked, lines) = follow(model, model.name, &ASKED);
+    assert!(asked.ends_with(&[0xa5, 0x60]), "{asked:x?}");
+    assert!(lines.contains("9.25° of its own look forward"), "{lines}");
+    assert_eq!(said["scans"], 25, "{said}");
+    let recording = folder("live").join(format!("{0}-{0}.rec", model.name));
+    let file = std::fs::read(recording).expect("recorded");
+    // The first beam's bearing with the zero and without.
+    let bearing = |file: &[u8]| {
+        let mut first = None;
+        let mut keep = |row: host_tests::decode::Row| {
+            first.get_or_insert(row.beam.bearing.radians().to_degrees());
+        };
+        host_tests::decode::decode(model.name, file, &mut keep).expect("a known lidar");
+        first.expect("a beam")
+    };
+    let plain = host_tests::formats::capture::plain(&file);
+    let turned = (bearing(&file) - bearing(&plain)).rem_euclid(360.0);
+    assert!((turned - 9.25).abs() < 0.01, "{turned}");
 }
 
 #[test]

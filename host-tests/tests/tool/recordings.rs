@@ -764,33 +764,19 @@ fn hostile_files_end_in_a_line_and_not_in_memory() {
 fn a_simulated_run_replays_from_each_of_its_files() {
     let dir = folder("own-run");
     let out = text(&dir);
-    let run = json(&beamfix(&[
-        "simulate",
-        "--out",
-        out,
-        "--seconds",
-        "8",
-        "--json",
-    ]));
-    for name in ["lidar.rec", "run.mcap"] {
-        let result = json(&beamfix(&["replay", text(&dir.join(name)), "--json"]));
-        assert_eq!(result["pose_hash"], run["pose_hash"], "{name}");
-        assert_eq!(result["lidar"], "ld06", "{name}");
-    }
-    let ring = dir.join("ring");
-    let run = json(&beamfix(&[
-        "simulate",
-        "--out",
-        text(&ring),
-        "--seconds",
-        "5",
-        "--lidar",
-        "vl53l5cx-ring",
-        "--json",
-    ]));
-    for name in ["ring.log", "run.mcap"] {
-        let result = json(&beamfix(&["replay", text(&ring.join(name)), "--json"]));
-        assert_eq!(result["pose_hash"], run["pose_hash"], "ring: {name}");
+    for (lidar, recording, model) in [
+        ("ld06", "lidar.rec", Value::from("ld06")),
+        ("vl53l5cx-ring", "ring.log", Value::Null),
+    ] {
+        let simulated = ["--seconds", "8", "--lidar", lidar, "--out", out, "--json"];
+        let run = json(&beamfix(&[&["simulate"], &simulated[..]].concat()));
+        for name in [recording, "run.mcap"] {
+            let result = json(&beamfix(&["replay", text(&dir.join(name)), "--json"]));
+            for key in ["pose_hash", "scans", "refused", "keyframes", "lost"] {
+                assert_eq!(result[key], run[key], "{lidar}, {name}: {key}");
+            }
+            assert_eq!(result["lidar"], model, "{name}");
+        }
     }
     let capture = fs::read(dir.join("lidar.rec")).expect("written");
     let output = replay(&dir.join("cut.rec"), &capture[..capture.len() - 7], &[]);
@@ -903,28 +889,25 @@ fn beams_that_say_nothing_do_not_count_against_a_pose() {
         ) else {
             continue;
         };
-        let result = json(&beamfix(&[
-            "replay",
-            text(&log),
-            "--mode",
-            "localize",
-            "--map",
-            text(&map),
+        let localize = |more: &[&str]| {
+            let arguments = [
+                "replay",
+                text(&log),
+                "--mode",
+                "localize",
+                "--map",
+                text(&map),
+            ];
+            beamfix(&[&arguments[..], more].concat())
+        };
+        let result = json(&localize(&[
             "--start=-0.6,0.3,11.459",
             "--trajectory",
             text(&trajectory),
             "--json",
         ]));
         // Half of the beams are no evidence for one place among all: that is said, and what to do.
-        let arguments = [
-            "replay",
-            text(&log),
-            "--mode",
-            "localize",
-            "--map",
-            text(&map),
-        ];
-        let output = beamfix(&arguments);
+        let output = localize(&[]);
         assert_eq!(output.status.code(), Some(2));
         let said = stderr(&output);
         assert!(said.contains("places the best explains"), "{said}");

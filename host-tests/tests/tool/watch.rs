@@ -4,9 +4,13 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::tool::{beamfix, folder, json, text};
-use beamfix_app::{App, AppConfig, CONFIG, telemetry::Reset};
+use beamfix::{geometry::Pose, lidar::Protocol, odometry::Odometry, scan::Mount};
+use beamfix_app::{
+    App, AppConfig, CONFIG, Firmware, Lidar as _, OdometryWith, Row, chosen, telemetry::Reset,
+};
 use beamfix_sim::drive::{Settings, drive};
-use beamfix_sim::encoder::ld06::Sensor;
+use beamfix_sim::encoder::{self, ld06::Sensor};
+use host_tests::formats::capture::Content;
 
 /// PNG, and large enough to hold a drawing.
 fn is_picture(path: &Path) {
@@ -97,20 +101,100 @@ fn sent_in(seconds: f64) -> (Vec<u8>, Vec<u8>) {
         ..Settings::DEFAULT
     };
     let bytes = drive(&settings, &mut Sensor::ld06()).bytes;
-    let config = AppConfig {
+    let app = App::<{ beamfix_app::BEAMS }>::new(recording(CONFIG));
+    let sent = sent_by(app, &bytes);
+    (bytes, sent)
+}
+
+/// The settings with all that may be sent.
+fn recording(config: AppConfig) -> AppConfig {
+    AppConfig {
         record: true,
         scans: true,
         quality: true,
-        ..CONFIG
-    };
-    let mut app = Box::new(App::<{ beamfix_app::BEAMS }>::new(config));
+        ..config
+    }
+}
+
+/// What a board sends that gets these bytes.
+fn sent_by<P: Protocol, const N: usize>(app: Firmware<P, Odometry<N>, N>, bytes: &[u8]) -> Vec<u8> {
+    let mut app = Box::new(app);
     let mut sent = app.ready(Reset::Power).to_vec();
     for (k, &byte) in bytes.iter().enumerate() {
         // From just before the clock wraps.
         app.set_time((k as u32 * 57).wrapping_sub(1_000_000));
         app.lidar_all(&[byte], |out| sent.extend_from_slice(out));
     }
-    (bytes, sent)
+    sent
+}
+
+/// Lidar and mount stand in the recording, as the board tells them, and in what the board sends: nothing need be told.
+#[test]
+fn what_a_board_was_told_of_its_lidar_is_in_the_recording() {
+    let folder = folder("watch-mounted");
+    let mount = Mount {
+        robot_from_lidar: Pose::new(0.08, -0.03, 2.5),
+        upside_down: true,
+    };
+    let mounted = |config: AppConfig| {
+        recording(AppConfig {
+            odometry: config.odometry.with_mount(mount),
+            ..config
+        })
+    };
+    type Xv11 = Row<{ chosen("xv11") }>;
+    let settings = Settings {
+        seconds: 8.0,
+        ..Settings::DEFAULT
+    };
+    let ld06 = drive(&settings, &mut Sensor::ld06()).bytes;
+    let xv11 = drive(&settings, encoder::for_model(Xv11::MODEL).as_mut()).bytes;
+    let boards = [
+        (
+            "ld06",
+            sent_by(App::<{ beamfix_app::BEAMS }>::new(mounted(CONFIG)), &ld06),
+        ),
+        (
+            "xv11",
+            sent_by(
+                OdometryWith::<Xv11, { Xv11::BEAMS }>::odometry(
+                    mounted(Xv11::CONFIG),
+                    Xv11::PARSER,
+                ),
+                &xv11,
+            ),
+        ),
+    ];
+    for (lidar, sent) in boards {
+        let frames = folder.join(format!("{lidar}.frames"));
+        let recording = folder.join(format!("{lidar}.rec"));
+        fs::write(&frames, &sent).expect("the test's file");
+        let watched = json(&beamfix(&[
+            "watch",
+            text(&frames),
+            "--out",
+            text(&folder.join("live.png")),
+            "--record",
+            text(&recording),
+            "--json",
+        ]));
+        for file in [&frames, &recording] {
+            let replayed = json(&beamfix(&["replay", text(file), "--json"]));
+            assert_eq!(replayed["lidar"], lidar);
+            let told = &replayed["mount"];
+            let number = |key: &str| told[key].as_f64().expect("a number") as f32;
+            assert_eq!(
+                Pose::new(number("x"), number("y"), number("theta")),
+                mount.robot_from_lidar
+            );
+            assert_eq!(told["upside_down"], true);
+            assert_eq!(replayed["scans"], watched["poses"], "{lidar}");
+            // An XV-11's board has settings for it; the tool replays all lidars with the same.
+            if lidar == "ld06" {
+                assert_eq!(replayed["pose_hash"], watched["pose_hash"]);
+            }
+        }
+    }
 }
 
 /// Whoever ends it by Ctrl-C has what came until then.
@@ -180,7 +264,7 @@ fn frames_of_a_file_are_drawn_and_recorded_to_the_byte() {
     assert!(bytes.starts_with(&kept) && kept.len() + 47 >= bytes.len());
     let times: Vec<u64> = host_tests::formats::capture::pieces(&file)
         .iter()
-        .skip(1)
+        .filter(|piece| matches!(piece.content, Content::Bytes(_)))
         .filter_map(|piece| piece.time_us)
         .collect();
     assert!(times.is_sorted(), "{times:?}");

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result, anyhow, ensure};
 use beamfix::lidar::Model;
+use beamfix::scan::Mount;
 use beamfix_sim::encoder::{self, Encoder};
 use beamfix_sim::place::Place;
 use beamfix_sim::robot::PERIOD;
@@ -66,7 +67,11 @@ impl Live {
         );
         let mut recorder = Recorder::new(Vec::new())?;
         recorder.push(0, Content::Lidar(model.name))?;
-        recorder.push(0, Content::Mount(settings.mount.into()))?;
+        let mount = Mount {
+            robot_from_lidar: settings.mount.into(),
+            ..Mount::DEFAULT
+        };
+        recorder.push(0, Content::Mount(mount))?;
         Ok(Self {
             underway: Underway::new(place.start, Vec::new(), &settings),
             world: place.world,

@@ -7,7 +7,6 @@ use beamfix::linalg::Covariance;
 use beamfix::localization::{Localizer, LocalizerConfig};
 use beamfix::matching::correlative::pyramid::Pyramid;
 use beamfix::matching::icp::Reference;
-use beamfix::odometry::Refusal;
 use beamfix::pipeline::{Estimate as _, Estimator, MapLocalizer, Mapped, Mapper512k};
 use beamfix::pipeline::{Pipeline, Revolution, Verdict};
 use beamfix::scan::{Mount, Points, PointsConfig};
@@ -18,7 +17,7 @@ use host_tests::decode::{WithParser, with_parser};
 use host_tests::formats::capture::Piece;
 use host_tests::formats::field::of_map;
 use host_tests::formats::ros_map;
-use host_tests::pipeline::{Pieces, config};
+use host_tests::pipeline::{Pieces, config, is_measured};
 use host_tests::report::hash::PoseHash;
 use host_tests::size;
 
@@ -342,8 +341,7 @@ impl Seen {
         self.hash.push(odometry.pose);
         self.count += 1;
         self.mapped = *pose;
-        let is_first = odometry.keyframe && odometry.outcome == Err(Refusal::First);
-        self.refused += usize::from(odometry.outcome.is_err() && !is_first);
+        self.refused += usize::from(!is_measured(odometry));
         self.odometry = Found {
             pose: odometry.pose,
             covariance: Some(odometry.covariance),

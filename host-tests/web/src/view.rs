@@ -182,7 +182,7 @@ impl Twin {
 const GATE: f64 = 128.0;
 
 fn placed(from_lidar: Pose, point: &ScanPoint) -> [f32; 2] {
-    let place = from_lidar * Point::new(f32::from(point.x) * 1e-3, f32::from(point.y) * 1e-3);
+    let place = from_lidar * Point::new(f32::from(point.x()) * 1e-3, f32::from(point.y()) * 1e-3);
     [place.x, place.y]
 }
 

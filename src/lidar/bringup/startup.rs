@@ -82,7 +82,7 @@ impl Startup {
                 Start::Listen => Talk::Listen,
                 Start::Send(bytes) => Talk::Send(bytes),
                 Start::Rplidar => Talk::Query(Query::rplidar(model.family)),
-                Start::Ydlidar { keeps_zero } => Talk::Query(Query::ydlidar(keeps_zero)),
+                Start::Ydlidar { .. } => Talk::Query(Query::ydlidar(model)),
                 Start::Sick => Talk::Line(Line::sick(model.baud)),
                 Start::Scip => Talk::Line(Line::scip(model.baud)),
             },
@@ -102,17 +102,12 @@ impl Startup {
     }
 
     /// Angle (0.01°, `0..36000`) that looks forward by the unit's own calibration, if it keeps one and told: what
-    /// [`Model::zero_cdeg`] should be. YDLIDAR G1, G2, TG.
-    ///
-    /// A quarter of a degree a count, to be added to the sensor's angles, by the maker's driver; the answer's layout by two
-    /// versions of it. No unit was at hand.
+    /// [`Model::zero_cdeg`], which is part of it, should be for the unit's parser. YDLIDAR G1, G2, TG; by the maker's driver, in two
+    /// versions; no unit was at hand.
     #[must_use]
     pub fn zero_cdeg(&self) -> Option<u16> {
         match &self.talk {
-            Talk::Query(query) => {
-                let added = query.zero()?.checked_mul(25)?;
-                Some(added.wrapping_neg().rem_euclid(36_000) as u16)
-            }
+            Talk::Query(query) => query.zero(),
             _ => None,
         }
     }
@@ -406,8 +401,20 @@ mod tests {
     fn a_unit_that_keeps_its_zero_is_asked_for_it() {
         const AHEAD: &[u8] = &[0xa5, 0x5a, 4, 0, 0, 0, 4, 6, 0, 0, 0];
         const BEHIND: &[u8] = &[0xa5, 0x5a, 4, 0, 0, 0, 4, 0xa6, 0xff, 0xff, 0xff];
-        for (zero, zero_cdeg) in [(AHEAD, 35_850), (BEHIND, 2250)] {
-            let mut startup = Startup::new(&Model::YDLIDAR_TG, StartConfig::DEFAULT);
+        const FAR: &[u8] = &[0xa5, 0x5a, 4, 0, 0, 0, 4, 0xd1, 2, 0, 0];
+        let turned = Model {
+            zero_cdeg: 18_000,
+            ..Model::YDLIDAR_TG
+        };
+        for (model, zero, zero_cdeg) in [
+            (&Model::YDLIDAR_TG, AHEAD, Some(35_850)),
+            (&Model::YDLIDAR_TG, BEHIND, Some(2250)),
+            (&turned, BEHIND, Some(20_250)),
+            (&Model::YDLIDAR_TG, FAR, None),
+            // One that does not answer starts all the same.
+            (&Model::YDLIDAR_TG, &[], None),
+        ] {
+            let mut startup = Startup::new(model, StartConfig::DEFAULT);
             let (end, _) = run(&mut startup, 20, |request| match request {
                 [0xa5, 0x90] => INFO_OLD,
                 [0xa5, 0x91] => GOOD,
@@ -416,15 +423,8 @@ mod tests {
                 _ => &[],
             });
             assert!(matches!(end, Action::Ready(_)), "{end:?}");
-            assert_eq!(startup.zero_cdeg(), Some(zero_cdeg));
+            assert_eq!(startup.zero_cdeg(), zero_cdeg);
         }
-        // One that does not answer starts all the same.
-        let mut startup = Startup::new(&Model::YDLIDAR_TG, StartConfig::DEFAULT);
-        assert!(matches!(
-            run(&mut startup, 20, |_| &[]),
-            (Action::Ready(_), true)
-        ));
-        assert_eq!(startup.zero_cdeg(), None);
     }
 
     #[test]

@@ -20,6 +20,8 @@ pub mod command;
 mod models;
 
 use crate::lidar::model::{Correction, Family, Flags, Model, Samples};
+#[cfg(feature = "internals")]
+use crate::lidar::wire::angle::from_cdeg;
 use crate::lidar::wire::angle::{divided, from_deg_q6};
 use crate::lidar::wire::answer;
 use crate::lidar::wire::framing::Verdict;
@@ -70,6 +72,12 @@ impl parser::Format for Format {
 
     fn judge(&self, bytes: &[u8]) -> Verdict {
         judge(bytes, self.samples.bytes)
+    }
+
+    /// The answer that tells it is not taken from the line: one to a question for the speed looks the same.
+    #[cfg(feature = "internals")]
+    fn set_zero(&mut self, zero_cdeg: u16) {
+        self.base.zero = from_cdeg(zero_cdeg.into());
     }
 
     fn packet(&mut self, frame: &[u8], _: bool, pace: &mut Pace) -> Option<Packet> {

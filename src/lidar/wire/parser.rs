@@ -19,6 +19,12 @@ pub trait Format {
     /// `follows` says that nothing was skipped since the frame before.
     fn packet(&mut self, frame: &[u8], follows: bool, pace: &mut Pace) -> Option<Self::Packet>;
 
+    /// What `Protocol::set_zero` says.
+    #[cfg(feature = "internals")]
+    fn set_zero(&mut self, zero_cdeg: u16) {
+        let _ = zero_cdeg;
+    }
+
     /// Frames among `bytes`, as [`Protocol::survey`] counts them.
     fn survey(&self, bytes: &[u8]) -> Survey {
         survey::count(bytes, |bytes| self.judge(bytes))
@@ -88,6 +94,11 @@ impl<F: Format, const L: usize> Protocol for Parser<F, L> {
 
     fn arrived(&mut self, now_us: u32) {
         self.pace.arrived(now_us);
+    }
+
+    #[cfg(feature = "internals")]
+    fn set_zero(&mut self, zero_cdeg: u16) {
+        self.format.set_zero(zero_cdeg);
     }
 
     fn pending_bytes(&self) -> usize {

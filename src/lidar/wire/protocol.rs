@@ -25,6 +25,15 @@ pub trait Protocol {
     /// Times of sensors without a clock are counted back from there. Without it they run at the sensor's nominal pace.
     fn arrived(&mut self, now_us: u32);
 
+    /// Takes the sensor's own angle (0.01°, `0..36000`) that looks forward from here on, in place of its model's: for a parser
+    /// that was made before [`Startup::zero_cdeg`](crate::lidar::startup::Startup::zero_cdeg) knew it.
+    ///
+    /// A parser whose sensors keep no such angle ignores it: all but YDLIDAR's.
+    #[cfg(feature = "internals")]
+    fn set_zero(&mut self, zero_cdeg: u16) {
+        let _ = zero_cdeg;
+    }
+
     /// Bytes held of a frame that is not complete yet.
     fn pending_bytes(&self) -> usize;
 

@@ -202,7 +202,7 @@ pub(super) fn places<const N: usize>(
             } else {
                 bearing
             };
-            let _ = points.push(ScanPoint::at(Bearing(bearing), range.min(32_000)));
+            let _ = points.push(ScanPoint::at(Bearing(bearing), range));
         }
     }
 }

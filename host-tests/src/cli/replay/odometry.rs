@@ -2,10 +2,10 @@
 
 use anyhow::Result;
 use beamfix::geometry::Pose;
-use beamfix::odometry::{Odometry, Refusal, Step};
+use beamfix::odometry::{Odometry, Step};
 use beamfix::pipeline::{Estimate as _, Estimator, Mapper64k};
 use host_tests::formats::Log;
-use host_tests::pipeline::{Followed, config, follow, sparse_odometry};
+use host_tests::pipeline::{Followed, config, follow, is_measured, sparse_odometry};
 use host_tests::{size, sized};
 use serde_json::json;
 
@@ -117,8 +117,7 @@ fn replay<E: Estimator<N>, const N: usize>(
     let ego = (count, args.uses_wheels());
     let followed = follow(log, ego, estimator, &mut |scan, pose, told| {
         let step = of(told);
-        let is_first = step.keyframe && step.outcome == Err(Refusal::First);
-        let is_measured = step.outcome.is_ok() || is_first;
+        let is_measured = is_measured(step);
         measured += usize::from(is_measured);
         keyframes += u32::from(step.keyframe);
         if let Some(file) = &mut trajectory {

@@ -91,7 +91,7 @@ pub fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Result<Log
     let (revolutions, summary) = revolutions(model.name, &content.bytes)?;
     ensure!(
         summary.packets > 0,
-        "{name}: no packet of an {lidar} in {} bytes; {} failed their check",
+        "{name}: no packet of the lidar {lidar} in {} bytes; {} failed their check",
         content.bytes.len(),
         summary.check_errors
     );
@@ -104,17 +104,14 @@ pub fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Result<Log
     let mount = capture::pieces(&content.bytes)
         .into_iter()
         .find_map(|piece| match piece.content {
-            Content::Mount(pose) => Some(pose),
+            Content::Mount(mount) => Some(mount),
             _ => None,
         });
     let mut log = Log {
         cut: content.cut.or_else(|| capture::cut(&content.bytes)),
-        mount: Mount {
-            robot_from_lidar: mount.unwrap_or(Pose::IDENTITY),
-            ..Mount::DEFAULT
-        },
+        mount: mount.unwrap_or(Mount::DEFAULT),
         is_mount_told: mount.is_some(),
-        source: format!("bytes of an {}", model.name),
+        source: format!("bytes of the lidar {}", model.name),
         lidar: Some(model.name.to_owned()),
         ..Log::default()
     };

@@ -40,7 +40,11 @@ pub fn capture(
         let mut revolutions = revolutions.iter().peekable();
         let mut recorder = Recorder::new(Vec::new())?;
         recorder.push(0, Content::Lidar(model.name))?;
-        recorder.push(0, Content::Mount(mount.into()))?;
+        let mount = Mount {
+            robot_from_lidar: mount.into(),
+            ..Mount::DEFAULT
+        };
+        recorder.push(0, Content::Mount(mount))?;
         let mut start = 0;
         let mut beside = beside(drive).into_iter().peekable();
         for (frame, &(end, measured_us)) in drive.frames.iter().enumerate() {

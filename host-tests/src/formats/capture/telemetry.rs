@@ -2,7 +2,7 @@
 
 use beamfix::geometry::Pose;
 use beamfix_app::link::Receiver;
-use beamfix_app::telemetry::Telemetry;
+use beamfix_app::telemetry::{Ready, Telemetry};
 
 use crate::formats::capture::{Content, MAGIC, Recorder};
 
@@ -16,11 +16,19 @@ pub fn capture(file: &[u8]) -> Option<Vec<u8>> {
     }
     let mut receiver = Receiver::new();
     let mut recorder = Recorder::new(Vec::new()).ok()?;
-    let (mut clock, mut is_any) = (Clock::default(), false);
+    let (mut clock, mut is_any, mut is_set_up) = (Clock::default(), false, false);
     for &byte in file {
         let Some(message) = receiver.push::<Telemetry>(byte) else {
             continue;
         };
+        if let Telemetry::Ready(ready) = &message
+            && !is_set_up
+        {
+            for content in setup(ready) {
+                recorder.push(0, content).ok()?;
+            }
+            is_set_up = true;
+        }
         if let Some((time_us, content)) = content(&message) {
             recorder.push(clock.after(time_us), content).ok()?;
             is_any |= matches!(content, Content::Bytes(_));
@@ -29,6 +37,13 @@ pub fn capture(file: &[u8]) -> Option<Vec<u8>> {
     // A check code of 16 bits holds once by chance; a board's frames fail it now and then.
     let counters = receiver.counters();
     (is_any && counters.frames > counters.errors).then(|| recorder.finish().ok())?
+}
+
+/// What a capture needs to know of a board besides what comes in later: its lidar, where it tells which, and its mount.
+pub fn setup(ready: &Ready) -> impl Iterator<Item = Content<'_>> {
+    let lidar = Some(ready.lidar.as_str()).filter(|name| !name.is_empty());
+    let mount = Content::Mount(ready.mount.mount());
+    lidar.map(Content::Lidar).into_iter().chain([mount])
 }
 
 /// What a board's message adds to a capture, and when it came in (µs, the board's clock, wrapping).

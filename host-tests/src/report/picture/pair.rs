@@ -95,7 +95,7 @@ impl PairPicture {
             reference: reference
                 .as_slice()
                 .iter()
-                .map(|p| metres_of(p.x, p.y))
+                .map(|p| metres_of(p.x(), p.y()))
                 .collect(),
             before: at_guess,
             after: place(end, LAST_GATE),

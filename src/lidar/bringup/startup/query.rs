@@ -7,7 +7,7 @@
 
 use super::action::{Action, Mode};
 use super::config::{StartConfig, StartError};
-use crate::lidar::model::Family;
+use crate::lidar::model::{Family, Model, Start};
 use crate::lidar::sensors::rplidar::command::{
     self as rplidar, Answer, Answers, CONF_ANSWER, CONF_PERIOD, CONF_TYPICAL, Health, Info,
 };
@@ -114,7 +114,9 @@ pub(super) struct Query {
     next_mode: u16,
     mode: Mode,
     keeps_zero: bool,
-    zero: Option<i32>,
+    /// The model's angle that looks forward (0.01°).
+    model_zero: u16,
+    zero: Option<u16>,
 }
 
 impl Query {
@@ -128,20 +130,24 @@ impl Query {
             Family::RplidarUltraDense => 0x86,
             _ => STANDARD,
         };
-        Self::new(&RPLIDAR, Some(wanted), false)
+        Self::new(&RPLIDAR, Some(wanted))
     }
 
     /// At the beginning; a YDLIDAR that keeps its zero angle is asked for it.
-    pub(super) const fn ydlidar(keeps_zero: bool) -> Self {
-        Self::new(&YDLIDAR, None, keeps_zero)
+    pub(super) const fn ydlidar(model: &Model) -> Self {
+        let mut query = Self::new(&YDLIDAR, None);
+        query.keeps_zero = matches!(model.start, Start::Ydlidar { keeps_zero: true });
+        query.model_zero = model.zero_cdeg;
+        query
     }
 
-    const fn new(commands: &'static Commands, wanted: Option<u8>, keeps_zero: bool) -> Self {
+    const fn new(commands: &'static Commands, wanted: Option<u8>) -> Self {
         Self {
             commands,
             wanted,
             next_mode: 0,
-            keeps_zero,
+            keeps_zero: false,
+            model_zero: 0,
             zero: None,
             step: Step::Stop,
             answers: Answers::new(),
@@ -162,8 +168,8 @@ impl Query {
         self.info
     }
 
-    /// The unit's own zero angle as it was told, a quarter of a degree a count.
-    pub(super) fn zero(&self) -> Option<i32> {
+    /// The angle that looks forward by the unit's own calibration (0.01°), as it was told.
+    pub(super) fn zero(&self) -> Option<u16> {
         self.zero
     }
 
@@ -331,7 +337,12 @@ impl Query {
             },
             Step::ZeroAngle => {
                 if let (0x04, &[z0, z1, z2, z3]) = (answer.kind, answer.payload()) {
-                    self.zero = Some(i32::from_le_bytes([z0, z1, z2, z3]));
+                    // A quarter of a degree a count, to be added to the sensor's angles. More than half a turn is no angle.
+                    let added = i32::from_le_bytes([z0, z1, z2, z3]);
+                    if (-720..=720).contains(&added) {
+                        let zero = i32::from(self.model_zero) - 25 * added;
+                        self.zero = Some(zero.rem_euclid(36_000) as u16);
+                    }
                     self.go(Step::Introduced);
                 }
             }

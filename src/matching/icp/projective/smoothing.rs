@@ -38,7 +38,7 @@ pub(super) fn smooth_towards(lines: &[Line], points: &mut [ScanPoint], at: Fixed
         let nearer = (3 * along + 32) >> 6;
         let range = distance - if facing >= 0 { nearer } else { -nearer };
         if (1..=i32::from(Points::<0>::MAX_RANGE_MM)).contains(&range) {
-            *point = ScanPoint::at(point.bearing, range as u16);
+            *point = ScanPoint::within(point.bearing, range as u16);
         }
     }
 }
