@@ -66,6 +66,7 @@ pub use wire::io;
 pub use wire::packet::{Packet, Sample};
 pub use wire::protocol::Protocol;
 pub use wire::request::Request;
+pub(crate) use wire::survey::Survey;
 #[cfg(feature = "internals")]
 pub use wire::{
     framing::{self, Framer, Verdict},

@@ -20,6 +20,7 @@
 
 mod estimator;
 mod gyro;
+mod late;
 mod map_localizer;
 #[cfg(feature = "slam")]
 mod mapper;
@@ -32,6 +33,7 @@ mod tracker;
 mod wheels;
 
 pub use estimator::{Estimate, Estimator, Verdict};
+pub use late::Late;
 pub use map_localizer::{Located, MapLocalizer};
 #[cfg(feature = "slam")]
 pub use mapper::{Mapped, Mapper, Mapper192k, Mapper512k};
@@ -41,7 +43,10 @@ pub use particle_localizer::ParticleLocalizer;
 pub use rolling::{Mapper64k, RollingMapper, RollingStep};
 pub use tracker::{Revolution, Tracker};
 
-use crate::lidar::{Packet, Protocol};
+use crate::{
+    lidar::{Packet, Protocol},
+    odometry::{Odometry, OdometryConfig},
+};
 
 /// A lidar's bytes, wheels and a gyroscope in, a step for each revolution out.
 ///
@@ -63,7 +68,7 @@ use crate::lidar::{Packet, Protocol};
 pub struct Pipeline<P: Protocol, E, const N: usize> {
     lidar: P,
     /// Here rather than on the stack, where it would lie below a match.
-    packet: Option<P::Packet>,
+    packet: Late<P::Packet>,
     tracker: Tracker<E, N>,
 }
 
@@ -93,7 +98,7 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
     pub const fn new(lidar: P, estimator: E) -> Self {
         Self {
             lidar,
-            packet: None,
+            packet: Late::Missing,
             tracker: Tracker::new(estimator),
         }
     }
@@ -127,10 +132,10 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
     /// Takes the packets that the parser has held back: for the end of a recording.
     pub fn finish(&mut self, sink: &mut impl Sink<P::Packet, E, N>) {
         loop {
-            self.packet = self.lidar.pull();
-            if self.packet.is_none() {
+            let Some(packet) = self.lidar.pull() else {
                 return;
-            }
+            };
+            self.packet = Late::Given(packet);
             self.pass_on(sink);
         }
     }
@@ -140,11 +145,11 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
     fn receive(&mut self, bytes: &[u8]) -> usize {
         let mut taken = 0;
         // The last packet has been passed on: without bytes there is none.
-        self.packet = None;
+        self.packet = Late::Missing;
         for &byte in bytes {
             taken += 1;
-            self.packet = self.lidar.push(byte);
-            if self.packet.is_some() {
+            if let Some(packet) = self.lidar.push(byte) {
+                self.packet = Late::Given(packet);
                 break;
             }
         }
@@ -152,7 +157,7 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
     }
 
     fn pass_on(&mut self, sink: &mut impl Sink<P::Packet, E, N>) {
-        if let Some(packet) = &self.packet {
+        if let Late::Given(packet) = &self.packet {
             let (beams, start) = (packet.beams(), packet.revolution_start());
             self.tracker
                 .push_packet(beams, start, |revolution| sink.revolution(revolution));
@@ -191,5 +196,33 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
     #[must_use]
     pub fn into_tracker(self) -> Tracker<E, N> {
         self.tracker
+    }
+}
+
+impl<P: Protocol, const N: usize> Pipeline<Late<P>, Odometry<N>, N> {
+    /// All bytes zero: a static of it takes no flash. To be used after [`Pipeline::set_up`].
+    ///
+    /// ```
+    /// use beamfix::{Odometry, OdometryConfig, Pipeline, lidar::parsers, pipeline::Late};
+    ///
+    /// type Robot = Pipeline<Late<parsers::Ldrobot>, Odometry<456>, 456>;
+    ///
+    /// fn start(robot: &mut Robot) {
+    ///     robot.set_up(parsers::Ldrobot::new(), OdometryConfig::DEFAULT);
+    /// }
+    /// # start(&mut Box::new(Robot::ZERO));
+    /// ```
+    pub const ZERO: Self = Self {
+        lidar: Late::Missing,
+        packet: Late::Missing,
+        tracker: Tracker::zero(Odometry::ZERO),
+    };
+
+    /// Begins anew with this parser and these settings, in its place: nothing large is on the stack meanwhile.
+    pub fn set_up(&mut self, lidar: P, config: OdometryConfig) {
+        self.lidar = Late::Given(lidar);
+        self.packet = Late::Missing;
+        self.tracker.restart();
+        self.tracker.estimator_mut().restart(config);
     }
 }

@@ -3,7 +3,7 @@
 use crate::{
     config::{self, ConfigError},
     lidar::Model,
-    matching::icp::IcpConfig,
+    matching::icp::{IcpConfig, Search},
     scan::{Mount, PointsConfig},
 };
 
@@ -57,6 +57,31 @@ impl OdometryConfig {
         icp: IcpConfig {
             min_constraint_share: 0.035,
             ..IcpConfig::DEFAULT
+        },
+    };
+
+    /// All bytes zero: no settings yet.
+    pub(super) const ZERO: Self = Self {
+        points: PointsConfig {
+            mount: Mount::DEFAULT,
+            min_range: 0.0,
+            max_range: 0.0,
+            max_points: 0,
+        },
+        directions: 0,
+        keyframe_distance: 0.0,
+        keyframe_rotation: 0.0,
+        keyframe_overlap: 0.0,
+        max_correction: 0.0,
+        prior_error: 0.0,
+        max_refused: 0,
+        icp: IcpConfig {
+            search: Search::Local,
+            coarse_beams: 0,
+            min_inliers: 0,
+            min_score: 0.0,
+            min_range_sigma: 0.0,
+            min_constraint_share: 0.0,
         },
     };
 

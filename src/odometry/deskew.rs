@@ -23,6 +23,12 @@ impl<const N: usize> Deskewed<N> {
         pose: Pose::IDENTITY,
     };
 
+    /// No points, at the origin.
+    pub fn clear(&mut self) {
+        self.points.clear();
+        (self.twist, self.pose) = (Twist::ZERO, Pose::IDENTITY);
+    }
+
     /// Deskews a scan during which the robot moved with `twist`; `pose` stays as it was.
     pub fn assign(&mut self, scan: &Scan<N>, twist: Twist, config: &PointsConfig) {
         self.points.assign(scan, twist, config);

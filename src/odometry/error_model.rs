@@ -145,10 +145,17 @@ impl Ratio {
 }
 
 impl WheelErrors {
+    /// All bytes zero.
+    pub const ZERO: Self = Self::assumed(0.0);
+
     pub const fn new() -> Self {
+        Self::assumed(1e-3)
+    }
+
+    const fn assumed(square: f32) -> Self {
         Self {
-            translation: Ratio::new(1e-3),
-            rotation: Ratio::new(1e-3),
+            translation: Ratio::new(square),
+            rotation: Ratio::new(square),
             last: [0.0; 3],
             off: Pose::IDENTITY,
             known: 0,

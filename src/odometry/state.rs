@@ -34,6 +34,14 @@ pub struct Odometry<const N: usize> {
 }
 
 impl<const N: usize> Odometry<N> {
+    /// All bytes zero: to be used after [`Odometry::restart`].
+    pub(crate) const ZERO: Self = {
+        let mut zero = Self::new(OdometryConfig::ZERO);
+        zero.keyframe.reference = Reference::ZERO;
+        zero.wheel_errors = WheelErrors::ZERO;
+        zero
+    };
+
     /// At the origin, with nothing seen yet.
     #[must_use]
     pub const fn new(config: OdometryConfig) -> Self {
@@ -49,15 +57,41 @@ impl<const N: usize> Odometry<N> {
             lateness: Lateness::UNKNOWN,
             end_us: None,
             refused_in_a_row: 0,
-            counters: Counters {
-                scans: 0,
-                refused: 0,
-                keyframes: 0,
-                lost: 0,
-                wheel_jumps: 0,
-                contradicted: 0,
-            },
+            counters: Counters::ZERO,
         }
+    }
+
+    /// Begins anew with these settings, in its place: as [`Odometry::new`], without a second one on the stack.
+    #[inline(never)]
+    pub(crate) fn restart(&mut self, config: OdometryConfig) {
+        // By name: a field more must be set here too.
+        let Self {
+            config: settings,
+            deskewed,
+            keyframe,
+            pose,
+            covariance,
+            motion,
+            tracking,
+            wheel_errors,
+            lateness,
+            end_us,
+            refused_in_a_row,
+            counters,
+        } = self;
+        *settings = config;
+        deskewed.clear();
+        keyframe.reference.restart(config.directions);
+        let origin = Keyframe::at_origin(());
+        (keyframe.pose, keyframe.covariance) = (origin.pose, origin.covariance);
+        (*pose, *covariance) = (origin.pose, origin.covariance);
+        *motion = Motion::STANDING;
+        *tracking = Tracking::at(Pose::IDENTITY, 0.0);
+        *wheel_errors = WheelErrors::new();
+        *lateness = Lateness::UNKNOWN;
+        *end_us = None;
+        *refused_in_a_row = 0;
+        *counters = Counters::ZERO;
     }
 
     /// The robot at the end of the last scan, in the frame in which it started (m, rad).

@@ -74,3 +74,14 @@ pub struct Counters {
     /// Scans whose match contradicted the prior and was believed.
     pub contradicted: u32,
 }
+
+impl Counters {
+    pub(super) const ZERO: Self = Self {
+        scans: 0,
+        refused: 0,
+        keyframes: 0,
+        lost: 0,
+        wheel_jumps: 0,
+        contradicted: 0,
+    };
+}

@@ -17,11 +17,18 @@ pub(super) struct Gyro {
 }
 
 impl Gyro {
+    /// All bytes zero.
+    pub const ZERO: Self = Self::of(0.0);
+
     pub const fn new() -> Self {
+        Self::of(f32::NAN)
+    }
+
+    const fn of(rate: f32) -> Self {
         Self {
             message_us: 0,
-            rate: f32::NAN,
-            rotation: f32::NAN,
+            rate,
+            rotation: rate,
             end_us: 0,
         }
     }

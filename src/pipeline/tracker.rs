@@ -42,12 +42,26 @@ impl<E, const N: usize> Tracker<E, N> {
         Self {
             assembler: Assembler::new(),
             estimator,
-            inertial: Inertial {
-                wheels: Wheels::new(),
-                gyro: Gyro::new(),
-                now_us: 0,
-            },
+            inertial: Inertial::new(),
         }
+    }
+
+    /// The same around an estimator of zeros: all bytes are zero.
+    pub(super) const fn zero(estimator: E) -> Self {
+        Self {
+            inertial: Inertial {
+                gyro: Gyro::ZERO,
+                ..Inertial::new()
+            },
+            assembler: Assembler::new(),
+            estimator,
+        }
+    }
+
+    /// Begins anew in its place, but for the estimator.
+    pub(super) fn restart(&mut self) {
+        self.assembler.reset();
+        self.inertial = Inertial::new();
     }
 
     /// Says when the beams pushed next came in (µs, wrapping).
@@ -131,6 +145,14 @@ impl<E: Estimator<N>, const N: usize> Tracker<E, N> {
 }
 
 impl Inertial {
+    const fn new() -> Self {
+        Self {
+            wheels: Wheels::new(),
+            gyro: Gyro::new(),
+            now_us: 0,
+        }
+    }
+
     /// Motion from the last revolution's end until now. Apart, so that its memory is not on the stack during a match.
     #[inline(never)]
     fn motion(&mut self) -> EgoMotion {

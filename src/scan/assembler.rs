@@ -162,6 +162,12 @@ impl<const N: usize> Assembler<N> {
         self.starts = Starts::new();
     }
 
+    /// As new.
+    pub(crate) fn reset(&mut self) {
+        self.restart();
+        self.refused = 0;
+    }
+
     fn keep(&mut self, beam: Beam) {
         if self.scan.push(beam).is_err() {
             self.refused = self.refused.wrapping_add(1);

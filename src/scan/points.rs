@@ -73,6 +73,11 @@ impl<const N: usize> Points<N> {
         }
     }
 
+    /// None again.
+    pub(crate) fn clear(&mut self) {
+        self.points.clear();
+    }
+
     /// The points in the order of measurement.
     #[must_use]
     pub fn as_slice(&self) -> &[ScanPoint] {

@@ -27,7 +27,7 @@ use beamfix::{
     geometry::Pose,
     lidar::{Protocol, parsers},
     odometry::Odometry,
-    pipeline::Pipeline,
+    pipeline::{Late, Pipeline},
 };
 use heapless::Vec;
 
@@ -61,9 +61,68 @@ pub type Board = App<BEAMS>;
 /// The same on a board with 16 KB of RAM.
 pub type SmallBoard = App<SMALL_BEAMS>;
 
+/// Nothing came in yet.
+const NO_PIECE: Raw = Raw {
+    time_us: 0,
+    bytes: Vec::new(),
+};
+
+/// Room for an application whose bytes are all zero: a static of it takes no flash, and nothing is copied at the start.
+///
+/// ```
+/// use beamfix_app::{AppConfig, Board, CONFIG, Place};
+///
+/// const HERE: AppConfig = CONFIG.checked();
+/// # fn once(place: &mut Place<Board>) {
+/// let app: &mut Board = place.app(&HERE); // `place` is a static: `Place::EMPTY`
+/// # }
+/// ```
+pub struct Place<F>(F);
+
+impl<const N: usize> Place<App<N>> {
+    /// Makes the application with an LD06 and odometry there: it waits for the first whole revolution.
+    pub fn app(&mut self, config: &AppConfig) -> &mut App<N> {
+        self.odometry::<lidars::Row<0>>(config)
+    }
+}
+
+impl<P: Protocol, const N: usize> Place<Firmware<P, Odometry<N>, N>> {
+    /// Nothing there yet.
+    pub const EMPTY: Self = Self(Firmware {
+        pipeline: Pipeline::ZERO,
+        commands: link::Receiver::new(),
+        piece: NO_PIECE,
+        lidar_bytes: 0,
+        report: Report::ZERO,
+    });
+
+    /// Makes the application there, as [`Firmware::odometry`] does, without a second one on the stack. L is the settings' lidar.
+    // Apart, so that its memory is not on the stack of whoever goes on with the application.
+    #[inline(never)]
+    pub fn odometry<L: Lidar<Parser = P>>(
+        &mut self,
+        config: &AppConfig,
+    ) -> &mut Firmware<P, Odometry<N>, N> {
+        let Self(app) = self;
+        let Firmware {
+            pipeline,
+            commands,
+            piece,
+            lidar_bytes,
+            report,
+        } = app;
+        pipeline.set_up(L::PARSER, config.odometry);
+        *commands = link::Receiver::new();
+        *piece = NO_PIECE;
+        *lidar_bytes = 0;
+        *report = Report::new(config);
+        app
+    }
+}
+
 /// The application with any lidar and any task: P reads the lidar's bytes, E finds the poses, N is the most beams a revolution may have.
 pub struct Firmware<P: Protocol, E, const N: usize> {
-    pipeline: Pipeline<P, E, N>,
+    pipeline: Pipeline<Late<P>, E, N>,
     commands: link::Receiver,
     /// The bytes of the lidar that came in last, together, and when.
     piece: Raw,
@@ -93,12 +152,9 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
     #[must_use]
     pub const fn with_task(config: &AppConfig, lidar: P, task: E) -> Self {
         Self {
-            pipeline: Pipeline::new(lidar, task),
+            pipeline: Pipeline::new(Late::Given(lidar), task),
             commands: link::Receiver::new(),
-            piece: Raw {
-                time_us: 0,
-                bytes: Vec::new(),
-            },
+            piece: NO_PIECE,
             lidar_bytes: 0,
             report: Report::new(config),
         }
@@ -114,12 +170,13 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
     /// Apart, so that its memory is not on the stack of whoever takes commands.
     #[inline(never)]
     fn send_ready(&mut self, reset: Reset) {
+        let name = self.report.lidar.map_or("", |model| model.name);
         let ready = Ready {
             version: VERSION,
             beams: N as u16,
             reset,
             mount: self.report.mount,
-            lidar: self.report.lidar.try_into().unwrap_or_default(),
+            lidar: name.try_into().unwrap_or_default(),
             task: E::KIND,
         };
         self.report.send(&Telemetry::Ready(ready));

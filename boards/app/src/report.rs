@@ -2,8 +2,10 @@
 
 #[cfg(feature = "truth")]
 use beamfix::geometry::Pose;
+#[cfg(feature = "mavlink")]
+use beamfix::pipeline::Late;
 use beamfix::{
-    lidar::Packet,
+    lidar::{Model, Packet},
     pipeline::{Revolution, Sink},
 };
 use heapless::Vec;
@@ -54,8 +56,8 @@ pub(crate) struct Report {
     pub care: Care,
     pub health_due: bool,
     pub mount: Mounted,
-    /// Name of its model.
-    pub lidar: &'static str,
+    /// Its model.
+    pub lidar: Option<&'static Model>,
     /// Questions answered since the last revolution or tick.
     answers: u8,
     /// Revolutions in a row with too few beams to be matched.
@@ -63,7 +65,7 @@ pub(crate) struct Report {
     #[cfg(feature = "mavlink")]
     link: mavlink::Link,
     #[cfg(feature = "mavlink")]
-    config: AppConfig,
+    config: Late<AppConfig>,
     pub out: Vec<u8, OUT>,
 }
 
@@ -84,6 +86,17 @@ impl<P: Packet, E: Task<N>, const N: usize> Sink<P, E, N> for Report {
 }
 
 impl Report {
+    /// All bytes zero: no settings yet.
+    pub const ZERO: Self = {
+        let mut zero = Self::new(&AppConfig::DEFAULT);
+        zero.lidar = None;
+        #[cfg(feature = "mavlink")]
+        {
+            zero.config = Late::Missing;
+        }
+        zero
+    };
+
     /// With nothing sent yet.
     pub const fn new(config: &AppConfig) -> Self {
         Self {
@@ -101,13 +114,13 @@ impl Report {
             scan_at: 0,
             health_due: false,
             mount: Mounted::of(&config.odometry.points.mount),
-            lidar: config.lidar.name,
+            lidar: Some(config.lidar),
             answers: 0,
             blind_turns: 0,
             #[cfg(feature = "mavlink")]
             link: mavlink::Link::new(),
             #[cfg(feature = "mavlink")]
-            config: *config,
+            config: Late::Given(*config),
             bytes_lost: 0,
             care: Care::NONE,
             out: Vec::new(),
@@ -162,14 +175,14 @@ impl Report {
             self.pose_us = Some(time_us);
         }
         #[cfg(feature = "mavlink")]
-        if self.output == Output::Mavlink {
+        if let (Output::Mavlink, Late::Given(config)) = (self.output, &self.config) {
             let told = mavlink::Told {
                 pose,
                 twist: revolution.estimator.twist(),
                 resets: revolution.estimator.lost() as u8,
-                autopilot: self.config.autopilot,
+                autopilot: config.autopilot,
             };
-            let limits = mavlink::Limits::of(&self.config);
+            let limits = mavlink::Limits::of(config);
             self.link
                 .append(&told, revolution.scan, &limits, &mut self.out);
         }

@@ -2,18 +2,19 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::{CONFIG, SmallBoard, telemetry::Reset};
+use beamfix_app::{CONFIG, Place, SmallBoard, telemetry::Reset};
 use qemu_m0::uart;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static mut APP: SmallBoard = SmallBoard::new(CONFIG);
+    static mut APP: Place<SmallBoard> = Place::EMPTY;
+    let app = APP.app(&CONFIG);
 
     uart::enable();
-    uart::send(APP.ready(Reset::Other));
+    uart::send(app.ready(Reset::Other));
     loop {
         if let Some(byte) = uart::received() {
-            uart::send(APP.lidar(&[byte]).1);
+            uart::send(app.lidar(&[byte]).1);
         }
     }
 }

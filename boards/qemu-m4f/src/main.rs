@@ -3,7 +3,7 @@
 #![no_main]
 
 use beamfix_app::{
-    AppConfig, Board, CONFIG,
+    AppConfig, Board, CONFIG, Place,
     ring::Ring,
     run::{Hardware, TICK_US, run},
 };
@@ -49,7 +49,7 @@ const HERE: AppConfig = CONFIG.for_features(cfg!(feature = "demo"), cfg!(feature
 
 #[entry]
 fn main() -> ! {
-    static mut APP: Board = Board::new(HERE);
+    static mut APP: Place<Board> = Place::EMPTY;
 
     Uart::TELEMETRY.enable();
     Uart::LIDAR.enable();
@@ -60,7 +60,7 @@ fn main() -> ! {
     let board = Mps2::default();
     #[cfg(feature = "demo")]
     let board = beamfix_selftest::simulated::Simulated::new(board);
-    run(APP, &HERE, (&LIDAR, &COMMANDS), board, Line::LOW)
+    run(APP.app(&HERE), &HERE, (&LIDAR, &COMMANDS), board, Line::LOW)
 }
 
 /// For the loop's look; the interrupt itself does nothing.

@@ -2,15 +2,15 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::{Board, CONFIG, telemetry::Reset};
+use beamfix_app::{Board, CONFIG, Place, telemetry::Reset};
 use qemu_rv32::uart;
 
 #[riscv_rt::entry]
 fn main() -> ! {
-    static mut APP: Board = Board::new(CONFIG);
+    static mut APP: Place<Board> = Place::EMPTY;
     let app = &raw mut APP;
     // SAFETY: only the start-up code calls `main`, once.
-    let app = unsafe { &mut *app };
+    let app = unsafe { &mut *app }.app(&CONFIG);
 
     uart::enable();
     uart::send(app.ready(Reset::Other));

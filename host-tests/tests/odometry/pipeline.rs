@@ -1,8 +1,11 @@
 //! One pipeline: what a board makes of bytes, wheels and gyroscope, the tool makes of a recording of them.
 
 use beamfix::geometry::{EgoMotion, Pose};
+use beamfix::lidar::Protocol as _;
 use beamfix::lidar::ld06::check_code;
+use beamfix::lidar::parsers::Ldrobot;
 use beamfix::odometry::{Odometry, OdometryConfig};
+use beamfix::pipeline::Late;
 use beamfix::scan::Scan;
 use beamfix_app::command::Command;
 use beamfix_app::telemetry::{self, Telemetry};
@@ -410,5 +413,47 @@ impl<P> beamfix::pipeline::Sink<P, Odometry<BEAMS>, BEAMS> for Frames {
 
     fn packet(&mut self, _: &P) {
         self.0 += 1;
+    }
+}
+
+#[test]
+fn a_pipeline_that_is_set_up_in_its_place_is_as_new() {
+    type Robot = beamfix::Pipeline<Late<Ldrobot>, Odometry<BEAMS>, BEAMS>;
+    let drive = driven(4.0);
+    let config = OdometryConfig::DEFAULT;
+    let follow = |robot: &mut Robot| {
+        let mut steps = Vec::new();
+        for (k, bytes) in drive.bytes.chunks(1000).enumerate() {
+            let now_us = 50_000 * k as u32;
+            robot.set_time(now_us);
+            let tracker = robot.tracker_mut();
+            tracker.push_wheels(now_us, Pose::new(0.001 * k as f32, 0.0, 0.0));
+            tracker.push_gyro(now_us, 0.01);
+            robot.push(bytes, &mut |revolution: beamfix::Revolution<_, BEAMS>| {
+                steps.push(format!("{:?}", revolution.step));
+            });
+        }
+        steps.push(format!("{:?}", robot.lidar().counters()));
+        steps.push(format!("{:?}", robot.tracker()));
+        steps
+    };
+    let mut robot = Box::new(Robot::ZERO);
+    let before = follow(&mut robot);
+    assert_eq!(before.len(), 2, "without a parser there are no steps");
+    let mut new = Box::new(Robot::new(
+        Late::Given(Ldrobot::new()),
+        Odometry::new(config),
+    ));
+    let wanted = follow(&mut new);
+    assert!(wanted.len() > 30, "{}", wanted.len());
+    // The second time after a drive, which leaves nothing behind.
+    for _ in 0..2 {
+        robot.set_up(Ldrobot::new(), config);
+        let steps = follow(&mut robot);
+        assert!(
+            steps == wanted,
+            "{:?}",
+            steps.iter().zip(&wanted).find(|(a, b)| a != b)
+        );
     }
 }

@@ -2,13 +2,13 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::SmallBoard;
+use beamfix_app::{Place, SmallBoard};
 use beamfix_emulated::{demo, finish};
 // The machine's memory and start.
 use qemu_m0 as _;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static mut APP: SmallBoard = SmallBoard::new(demo::TEXT);
-    finish(demo::run(APP))
+    static mut APP: Place<SmallBoard> = Place::EMPTY;
+    finish(demo::run(APP.app(&demo::TEXT)))
 }

@@ -2,12 +2,12 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::{CONFIG, SmallBoard};
+use beamfix_app::{CONFIG, Place, SmallBoard};
 use beamfix_emulated::{finish, replay, stack::Stack};
 use qemu_m0::clock::Timer;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static mut APP: SmallBoard = SmallBoard::new(CONFIG);
-    finish(replay::run(APP, &mut Timer, &Stack::paint()))
+    static mut APP: Place<SmallBoard> = Place::EMPTY;
+    finish(replay::run(APP.app(&CONFIG), &mut Timer, &Stack::paint()))
 }

@@ -2,13 +2,13 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::Board;
+use beamfix_app::{Place, Board};
 use beamfix_emulated::{demo, finish};
 // The machine's memory and start.
 use qemu_m4f as _;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static mut APP: Board = Board::new(demo::TEXT);
-    finish(demo::run(APP))
+    static mut APP: Place<Board> = Place::EMPTY;
+    finish(demo::run(APP.app(&demo::TEXT)))
 }

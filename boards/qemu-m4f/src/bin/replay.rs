@@ -2,12 +2,12 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::{Board, CONFIG};
+use beamfix_app::{Board, CONFIG, Place};
 use beamfix_emulated::{finish, replay, stack::Stack};
 use qemu_m4f::clock::Timer;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static mut APP: Board = Board::new(CONFIG);
-    finish(replay::run(APP, &mut Timer, &Stack::paint()))
+    static mut APP: Place<Board> = Place::EMPTY;
+    finish(replay::run(APP.app(&CONFIG), &mut Timer, &Stack::paint()))
 }

@@ -2,15 +2,16 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::Board;
+use beamfix_app::{Board, Place};
 use beamfix_emulated::{demo, finish};
 // The machine's memory and start.
 use qemu_rv32 as _;
 
 #[riscv_rt::entry]
 fn main() -> ! {
-    static mut APP: Board = Board::new(demo::TEXT);
+    static mut APP: Place<Board> = Place::EMPTY;
     let app = &raw mut APP;
     // SAFETY: only the start-up code calls `main`, once.
-    finish(demo::run(unsafe { &mut *app }))
+    let app = unsafe { &mut *app }.app(&demo::TEXT);
+    finish(demo::run(app))
 }

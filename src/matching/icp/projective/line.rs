@@ -34,6 +34,16 @@ impl Line {
         uy: 0,
     };
 
+    /// All bytes zero, for a reference without directions.
+    pub(super) const ZERO: Self = Self {
+        qx: 0,
+        qy: 0,
+        mx: 0,
+        my: 0,
+        ux: 0,
+        uy: 0,
+    };
+
     /// Whether a surface was seen there.
     #[must_use]
     pub const fn is_some(&self) -> bool {

@@ -23,19 +23,37 @@ impl<const N: usize> Reference<N> {
         Self::with_directions(u16::MAX)
     }
 
+    /// No directions: all its bytes are zero.
+    pub(crate) const ZERO: Self = Self {
+        lines: [Line::ZERO; N],
+        count: 0,
+        directions: 0,
+        sigma: 0,
+    };
+
     /// No lines; `directions` of them, at most N: matches do not depend on N then, only on this.
     #[must_use]
     pub(crate) const fn with_directions(directions: u16) -> Self {
-        let all = if N > u16::MAX as usize {
-            u16::MAX
-        } else {
-            N as u16
-        };
         Self {
             lines: Self::no_lines(),
             count: 0,
             sigma: 0,
-            directions: if directions < all { directions } else { all },
+            directions: Self::at_most_n(directions),
+        }
+    }
+
+    /// The same in its place.
+    pub(crate) fn restart(&mut self, directions: u16) {
+        self.lines.fill(Line::NONE);
+        (self.count, self.sigma) = (0, 0);
+        self.directions = Self::at_most_n(directions);
+    }
+
+    const fn at_most_n(directions: u16) -> u16 {
+        if (directions as usize) < N {
+            directions
+        } else {
+            N as u16
         }
     }
 
