@@ -35,7 +35,8 @@ pub struct Board {
     pub name: &'static str,
     /// What it stands for.
     pub core: &'static str,
-    firmware: Firmware,
+    /// Its programs.
+    pub firmware: Firmware,
     emulator: &'static str,
     machine: &'static [&'static str],
     /// Where the memory for statics and stack starts.

@@ -1,7 +1,7 @@
 //! A lidar as a type: its row of the table of models, its parser, its settings, all known when the firmware is compiled.
 
 use beamfix::{
-    lidar::{Model, Protocol, parsers},
+    lidar::{Model, Protocol, Start, parsers},
     odometry::Odometry,
 };
 
@@ -17,6 +17,8 @@ pub trait Lidar {
     const PARSER: Self::Parser;
     /// Most beams of a revolution.
     const BEAMS: usize = beams(Self::MODEL);
+    /// Whether it must be asked to start, over a line to it.
+    const ASKS: bool = !matches!(Self::MODEL.start, Start::Listen);
     /// The application's settings for it.
     const CONFIG: AppConfig = AppConfig::for_model(Self::MODEL);
 }

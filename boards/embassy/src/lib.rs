@@ -1,9 +1,12 @@
 //! The main loop of the boards with embassy: everything waits by `await`, over `embedded-io-async`.
 #![no_std]
 
+use beamfix::lidar::Protocol;
 use beamfix_app::{
-    App, AppConfig, LIDAR_BAUD,
+    AppConfig, Firmware, Lidar,
+    starter::{Starter, Wanted},
     supervisor::{LOOK_US, Supervisor},
+    task::Task,
     telemetry::Reset,
 };
 use embassy_futures::select::{Either, select};
@@ -13,26 +16,31 @@ use embedded_io_async::{Read, Write};
 
 /// The lines of a board.
 pub struct Lines<L, C, T> {
-    /// From the lidar; buffered, for bytes arrive while a match is computed.
+    /// From and to the lidar; buffered, for bytes arrive while a match is computed.
     pub lidar: L,
+    /// Sets its speed (bits/s), once all that was sent has left it.
+    pub set_lidar_baud: fn(&mut L, u32),
     /// The command line: wheels, gyroscope, questions.
     pub commands: C,
     /// The telemetry line: poses and health.
     pub telemetry: T,
 }
 
-/// Runs the application for ever; `feed` keeps the board from being reset and is called only while something goes on.
-pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
-    app: &mut App<N>,
+/// Runs the application with the lidar M, which is the settings' one, for ever; `feed` keeps the board from being reset and is
+/// called only while something goes on.
+pub async fn run<M: Lidar, E: Task<N>, const N: usize, L: Read + Write>(
+    app: &mut Firmware<M::Parser, E, N>,
     config: &AppConfig,
     reset: Reset,
-    mut lines: Lines<L, C, T>,
+    mut lines: Lines<L, impl Read, impl Write>,
     pwm: impl SetDutyCycle,
     mut feed: impl FnMut(),
 ) -> ! {
     let mut supervisor = Supervisor::new(pwm, config, now_us());
+    let mut starter = Starter::new(config.lidar);
     let _ = lines.telemetry.write_all(app.ready(reset)).await;
-    defmt::info!("beamfix listens for an LD06 at {} baud", LIDAR_BAUD);
+    let (name, baud) = (config.lidar.name, config.lidar.baud);
+    defmt::info!("beamfix listens for {} at {} baud", name, baud);
     let mut overruns = 0u32;
     #[cfg(feature = "demo")]
     let mut demo = beamfix_selftest::demo::Demo::new();
@@ -40,7 +48,10 @@ pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
         let now_us = now_us();
         app.set_time(now_us);
         if supervisor.is_due(now_us) {
-            let care = supervisor.look(now_us, app.seen());
+            let mut care = supervisor.look(now_us, app.seen());
+            if M::ASKS {
+                starter.look(now_us, &mut care);
+            }
             app.set_care(care);
             if care.progress {
                 feed();
@@ -48,6 +59,17 @@ pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
             let due = app.tick();
             if !due.is_empty() {
                 let _ = lines.telemetry.write_all(due).await;
+            }
+            while M::ASKS
+                && let Some(wanted) = starter.wants(now_us)
+            {
+                match wanted {
+                    Wanted::Send(request) => {
+                        let _ = lines.lidar.write_all(&request).await;
+                        let _ = lines.lidar.flush().await;
+                    }
+                    Wanted::SetBaud(baud) => (lines.set_lidar_baud)(&mut lines.lidar, baud),
+                }
             }
         }
         #[cfg(feature = "demo")]
@@ -69,6 +91,9 @@ pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
             Ok(Either::Second(Err(_))) | Err(_) => continue,
         };
         let mut rest = bytes.unwrap_or_default();
+        if M::ASKS && is_lidar {
+            starter.heard(rest);
+        }
         while !rest.is_empty() {
             let (taken, sent) = if is_lidar {
                 app.lidar(rest)
@@ -86,8 +111,8 @@ pub async fn run<const N: usize, L: Read, C: Read, T: Write>(
 
 /// Lets the simulated lidar send what it has measured until now.
 #[cfg(feature = "demo")]
-async fn simulate<const N: usize>(
-    app: &mut App<N>,
+async fn simulate<P: Protocol, E: Task<N>, const N: usize>(
+    app: &mut Firmware<P, E, N>,
     demo: &mut beamfix_selftest::demo::Demo,
     telemetry: &mut impl Write,
     now_us: u32,
@@ -116,7 +141,7 @@ async fn simulate<const N: usize>(
     }
 }
 
-fn log<const N: usize>(app: &App<N>) {
+fn log<P: Protocol, E: Task<N>, const N: usize>(app: &Firmware<P, E, N>) {
     let pose = app.pose();
     defmt::info!("x {} m, y {} m, heading {} rad", pose.x, pose.y, pose.theta);
 }

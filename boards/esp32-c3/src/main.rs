@@ -1,4 +1,4 @@
-//! LD06 bytes in at GPIO4, frames out at GPIO21 and commands in at GPIO20 (the board's USB bridge), the motor's PWM at
+//! Lidar bytes in at GPIO4, requests to it out at GPIO5, frames out at GPIO21 and commands in at GPIO20 (the board's USB bridge), the motor's PWM at
 //! GPIO6; poses on the probe's log too.
 #![no_std]
 #![no_main]
@@ -7,7 +7,7 @@ use core::cell::RefCell;
 
 use beamfix::geometry::Pose;
 use beamfix_app::{
-    AppConfig, CONFIG, LIDAR_BAUD, TELEMETRY_BAUD,
+    AppConfig, Lidar as _, OdometryWith, Place, Row, TELEMETRY_BAUD, chosen,
     ring::Ring,
     run::{Hardware, TICK_US, run},
     telemetry::Reset,
@@ -36,7 +36,7 @@ use esp_hal::{
     },
     uart::{Config, RxConfig, Uart, UartInterrupt, UartRx, UartTx},
 };
-use static_cell::StaticCell;
+use static_cell::ConstStaticCell;
 
 esp_bootloader_esp_idf::esp_app_desc!();
 
@@ -54,12 +54,19 @@ static TICK: Mutex<RefCell<Option<PeriodicTimer<'static, Blocking>>>> =
 static LIDAR: Ring<4096> = Ring::new();
 static COMMANDS: Ring<1024> = Ring::new();
 
+/// The lidar: a name of `beamfix lidars`; BEAMFIX_LIDAR=NAME builds for another.
+type Lidar = Row<{ chosen("ld06") }>;
+/// The task, and the most beams of a revolution.
+type Robot = OdometryWith<Lidar, { Lidar::BEAMS }>;
+
 struct Board {
     telemetry: UartTx<'static, Blocking>,
     watchdog: Wdt<TIMG0<'static>>,
 }
 
 impl Hardware for Board {
+    const ASKS: bool = Lidar::ASKS;
+
     fn reset(&mut self) -> Reset {
         match reset_reason(Cpu::ProCpu) {
             Some(SocResetReason::ChipPowerOn | SocResetReason::SysBrownOut) => Reset::Power,
@@ -74,6 +81,20 @@ impl Hardware for Board {
 
     fn send(&mut self, bytes: &[u8]) {
         let _ = self.telemetry.write_all(bytes);
+    }
+
+    fn send_to_lidar(&mut self, bytes: &[u8]) {
+        // One at a time: interrupts wait for no more than that.
+        for &byte in bytes {
+            with_lidar(|uart| {
+                let _ = uart.write_all(&[byte]);
+                let _ = uart.flush();
+            });
+        }
+    }
+
+    fn set_lidar_baud(&mut self, baud: u32) {
+        with_lidar(|uart| uart.apply_config(&uart_at(baud)));
     }
 
     fn feed_watchdog(&mut self) {
@@ -91,23 +112,22 @@ impl Hardware for Board {
 }
 
 /// As this crate's features want it.
-const HERE: AppConfig = CONFIG.for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"));
+const HERE: AppConfig = Lidar::CONFIG
+    .for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"))
+    .checked();
 
 #[main]
 fn main() -> ! {
-    static APP: StaticCell<beamfix_app::Board> = StaticCell::new();
-    let app = APP.init_with(|| beamfix_app::Board::new(HERE));
+    static APP: ConstStaticCell<Place<Robot>> = ConstStaticCell::new(Place::EMPTY);
+    let app = APP.take().odometry::<Lidar>(&HERE);
 
     let config = esp_hal::Config::default().with_cpu_clock(esp_hal::clock::CpuClock::max());
     let p = esp_hal::init(config);
-    let uart = |baud| {
-        let rx = RxConfig::default().with_fifo_full_threshold(BYTES);
-        Config::default().with_baudrate(baud).with_rx(rx)
-    };
-    let mut lidar = Uart::new(p.UART1, uart(LIDAR_BAUD))
+    let mut lidar = Uart::new(p.UART1, uart_at(Lidar::MODEL.baud))
         .expect("a possible baud rate")
-        .with_rx(p.GPIO4);
-    let mut other = Uart::new(p.UART0, uart(TELEMETRY_BAUD))
+        .with_rx(p.GPIO4)
+        .with_tx(p.GPIO5);
+    let mut other = Uart::new(p.UART0, uart_at(TELEMETRY_BAUD))
         .expect("a possible baud rate")
         .with_rx(p.GPIO20)
         .with_tx(p.GPIO21);
@@ -148,7 +168,8 @@ fn main() -> ! {
         })
         .expect("a duty that the channel has");
 
-    defmt::info!("beamfix listens for an LD06 at {} baud", LIDAR_BAUD);
+    let (name, baud) = (Lidar::MODEL.name, Lidar::MODEL.baud);
+    defmt::info!("beamfix listens for {} at {} baud", name, baud);
     let mut watchdog = TimerGroup::new(p.TIMG0).wdt;
     watchdog.set_timeout(MwdtStage::Stage0, PATIENCE);
     watchdog.enable();
@@ -159,6 +180,16 @@ fn main() -> ! {
     #[cfg(feature = "demo")]
     let board = beamfix_selftest::simulated::Simulated::new(board);
     run(app, &HERE, (&LIDAR, &COMMANDS), board, motor)
+}
+
+fn uart_at(baud: u32) -> Config {
+    let rx = RxConfig::default().with_fifo_full_threshold(BYTES);
+    Config::default().with_baudrate(baud).with_rx(rx)
+}
+
+/// Does something with the lidar's UART, once there is one.
+fn with_lidar<R>(f: impl FnOnce(&mut Uart<'static, Blocking>) -> R) -> Option<R> {
+    critical_section::with(|cs| LIDAR_UART.borrow_ref_mut(cs).as_mut().map(f))
 }
 
 /// Wakes the loop up: nothing else to do.
@@ -173,11 +204,9 @@ fn wake() {
 
 #[handler]
 fn lidar_bytes() {
-    critical_section::with(|cs| {
-        if let Some(uart) = LIDAR_UART.borrow_ref_mut(cs).as_mut() {
-            drain(|bytes| uart.read_buffered(bytes), &LIDAR);
-            uart.clear_interrupts(UartInterrupt::RxFifoFull | UartInterrupt::RxTimeout);
-        }
+    with_lidar(|uart| {
+        drain(|bytes| uart.read_buffered(bytes), &LIDAR);
+        uart.clear_interrupts(UartInterrupt::RxFifoFull | UartInterrupt::RxTimeout);
     });
 }
 

@@ -1,17 +1,17 @@
-//! LD06 bytes in at P1.01, frames out and commands in over the probe's USB, the motor's PWM at P1.03, all by await; poses
+//! Lidar bytes in at P1.01, requests to it out at P1.02, frames out and commands in over the probe's USB, the motor's PWM at P1.03, all by await; poses
 //! on the probe's log too.
 #![no_std]
 #![no_main]
 
 use core::convert::Infallible;
 
-use beamfix_app::{AppConfig, Board, CONFIG, telemetry::Reset};
+use beamfix_app::{AppConfig, Lidar as _, OdometryWith, Place, Row, chosen, telemetry::Reset};
 use beamfix_embassy::{Lines, run};
 use defmt_rtt as _;
 use embassy_executor::Spawner;
 use embassy_nrf::{
     bind_interrupts,
-    buffered_uarte::{BufferedUarte, BufferedUarteRx, InterruptHandler},
+    buffered_uarte::{BufferedUarte, InterruptHandler},
     pac,
     peripherals::{UARTE0, UARTE1},
     pwm::{DutyCycle, Prescaler, SimpleConfig, SimplePwm},
@@ -32,12 +32,21 @@ bind_interrupts!(struct Interrupts {
     UARTE1 => InterruptHandler<UARTE1>;
 });
 
-/// As this crate's features want it.
-const HERE: AppConfig = CONFIG.for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"));
+/// The lidar: a name of `beamfix lidars`; BEAMFIX_LIDAR=NAME builds for another.
+type Lidar = Row<{ chosen("ld06") }>;
+/// The task, and the most beams of a revolution.
+type Robot = OdometryWith<Lidar, { Lidar::BEAMS }>;
 
-static APP: ConstStaticCell<Board> = ConstStaticCell::new(Board::new(HERE));
+/// As this crate's features want it.
+const HERE: AppConfig = Lidar::CONFIG
+    .for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"))
+    .checked();
+
+static APP: ConstStaticCell<Place<Robot>> = ConstStaticCell::new(Place::EMPTY);
 /// What arrives while a match is computed: 178 ms of an LD06.
 static LIDAR: ConstStaticCell<[u8; 4096]> = ConstStaticCell::new([0; 4096]);
+/// Requests to it.
+static TO_LIDAR: ConstStaticCell<[u8; 32]> = ConstStaticCell::new([0; 32]);
 static COMMANDS: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
 static TELEMETRY: ConstStaticCell<[u8; 256]> = ConstStaticCell::new([0; 256]);
 
@@ -67,16 +76,18 @@ async fn main(_spawner: Spawner) {
         config.baudrate = baudrate;
         config
     };
-    let lidar = BufferedUarteRx::new(
+    let lidar = BufferedUarte::new(
         p.UARTE0,
         p.TIMER1,
         p.PPI_CH0,
         p.PPI_CH1,
         p.PPI_GROUP0,
-        Interrupts,
         p.P1_01,
-        uart(Baudrate::Baud230400),
+        p.P1_02,
+        Interrupts,
+        uart(baudrate(Lidar::MODEL.baud)),
         LIDAR.take(),
+        TO_LIDAR.take(),
     );
     let (commands, telemetry) = BufferedUarte::new(
         p.UARTE1,
@@ -105,11 +116,19 @@ async fn main(_spawner: Spawner) {
     };
     let lines = Lines {
         lidar,
+        set_lidar_baud: |uart, baud| uart.set_baudrate(baudrate(baud)),
         commands,
         telemetry,
     };
     let feed = || WatchdogHandle::pet(&mut watchdog);
-    run(APP.take(), &HERE, reset, lines, motor, feed).await
+    let app = APP.take().odometry::<Lidar>(&HERE);
+    run::<Lidar, _, _, _>(app, &HERE, reset, lines, motor, feed).await
+}
+
+/// The UART's divisor: 16 MHz are 2³², of which it takes the upper 20 bits.
+const fn baudrate(baud: u32) -> Baudrate {
+    let bits = ((baud as u64) << 32) / 16_000_000;
+    Baudrate::from_bits(((bits + 0x800) & 0xffff_f000) as u32)
 }
 
 /// Why the chip has started; forgets it, so that the next time tells itself.

@@ -1,4 +1,4 @@
-//! LD06 bytes in at PA10, frames out and commands in over the ST-Link's USB, the motor's PWM at PB6; poses on the probe's
+//! Lidar bytes in at PA10, requests to it out at PA9, frames out and commands in over the ST-Link's USB, the motor's PWM at PB6; poses on the probe's
 //! log too.
 #![no_std]
 #![no_main]
@@ -7,7 +7,7 @@ use core::cell::RefCell;
 
 use beamfix::geometry::Pose;
 use beamfix_app::{
-    AppConfig, CONFIG, LIDAR_BAUD, TELEMETRY_BAUD,
+    AppConfig, Lidar as _, OdometryWith, Place, Row, TELEMETRY_BAUD, chosen,
     ring::Ring,
     run::{Hardware, TICK_US, run},
     telemetry::Reset,
@@ -33,7 +33,15 @@ static COMMAND_UART: Mutex<RefCell<Option<Rx<pac::USART2>>>> = Mutex::new(RefCel
 static LIDAR: Ring<4096> = Ring::new();
 static COMMANDS: Ring<1024> = Ring::new();
 
+/// The lidar: a name of `beamfix lidars`; BEAMFIX_LIDAR=NAME builds for another.
+type Lidar = Row<{ chosen("ld06") }>;
+/// The task, and the most beams of a revolution.
+type Robot = OdometryWith<Lidar, { Lidar::BEAMS }>;
+
 struct Board {
+    to_lidar: Tx<pac::USART1>,
+    /// Of the lidar's UART (Hz).
+    lidar_clock: u32,
     telemetry: Tx<pac::USART2>,
     clock: Counter<pac::TIM2, 1_000_000>,
     watchdog: IndependentWatchdog,
@@ -41,6 +49,8 @@ struct Board {
 }
 
 impl Hardware for Board {
+    const ASKS: bool = Lidar::ASKS;
+
     fn reset(&mut self) -> Reset {
         self.reset
     }
@@ -51,6 +61,22 @@ impl Hardware for Board {
 
     fn send(&mut self, bytes: &[u8]) {
         let _ = self.telemetry.write_all(bytes);
+    }
+
+    fn send_to_lidar(&mut self, bytes: &[u8]) {
+        let _ = self.to_lidar.write_all(bytes);
+        let _ = embedded_io::Write::flush(&mut self.to_lidar);
+    }
+
+    fn set_lidar_baud(&mut self, baud: u32) {
+        // As the HAL reckons it where the clock is at least 16 times as fast.
+        let divisor = (self.lidar_clock + baud / 2) / baud;
+        // SAFETY: nothing else writes this register after the start.
+        unsafe {
+            (*pac::USART1::ptr())
+                .brr()
+                .write(|w| w.bits(divisor as u16))
+        };
     }
 
     fn feed_watchdog(&mut self) {
@@ -67,11 +93,13 @@ impl Hardware for Board {
 }
 
 /// As this crate's features want it.
-const HERE: AppConfig = CONFIG.for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"));
+const HERE: AppConfig = Lidar::CONFIG
+    .for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"))
+    .checked();
 
 #[entry]
 fn main() -> ! {
-    static mut APP: beamfix_app::Board = beamfix_app::Board::new(HERE);
+    static mut APP: Place<Robot> = Place::EMPTY;
 
     let p = pac::Peripherals::take().expect("the first to take them");
     let mut core = cortex_m::Peripherals::take().expect("the first to take them");
@@ -86,10 +114,11 @@ fn main() -> ! {
     let gpiob = p.GPIOB.split(&mut rcc);
     let config = |baud: u32| serial::config::Config::default().baudrate(baud.bps());
 
-    let mut lidar: Rx<_> = p
+    let (to_lidar, mut lidar) = p
         .USART1
-        .rx(gpioa.pa10, config(LIDAR_BAUD), &mut rcc)
-        .expect("a possible baud rate");
+        .serial::<u8>((gpioa.pa9, gpioa.pa10), config(Lidar::MODEL.baud), &mut rcc)
+        .expect("a possible baud rate")
+        .split();
     let (telemetry, mut commands) = p
         .USART2
         .serial::<u8>((gpioa.pa2, gpioa.pa3), config(TELEMETRY_BAUD), &mut rcc)
@@ -123,10 +152,13 @@ fn main() -> ! {
     core.SYST.enable_interrupt();
     core.SYST.enable_counter();
 
-    defmt::info!("beamfix listens for an LD06 at {} baud", LIDAR_BAUD);
+    let (name, baud) = (Lidar::MODEL.name, Lidar::MODEL.baud);
+    defmt::info!("beamfix listens for {} at {} baud", name, baud);
     let mut watchdog = IndependentWatchdog::new(p.IWDG);
     watchdog.start(1.secs());
     let board = Board {
+        to_lidar,
+        lidar_clock: rcc.clocks.pclk2().raw(),
         telemetry,
         clock,
         watchdog,
@@ -134,7 +166,8 @@ fn main() -> ! {
     };
     #[cfg(feature = "demo")]
     let board = beamfix_selftest::simulated::Simulated::new(board);
-    run(APP, &HERE, (&LIDAR, &COMMANDS), board, motor)
+    let app = APP.odometry::<Lidar>(&HERE);
+    run(app, &HERE, (&LIDAR, &COMMANDS), board, motor)
 }
 
 /// Why the chip has started; forgets it, so that the next time tells itself.

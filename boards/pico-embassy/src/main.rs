@@ -1,9 +1,11 @@
-//! LD06 bytes in at GP5, commands at GP1, frames out at GP0, the motor's PWM at GP6, all by await; poses on the probe's
+//! Lidar bytes in at GP5, requests to it out at GP4, commands at GP1, frames out at GP0, the motor's PWM at GP6, all by await; poses on the probe's
 //! log too.
 #![no_std]
 #![no_main]
 
-use beamfix_app::{AppConfig, Board, CONFIG, LIDAR_BAUD, TELEMETRY_BAUD, telemetry::Reset};
+use beamfix_app::{
+    AppConfig, Lidar as _, OdometryWith, Place, Row, TELEMETRY_BAUD, chosen, telemetry::Reset,
+};
 use beamfix_embassy::{Lines, run};
 use defmt_rtt as _;
 use embassy_executor::Spawner;
@@ -12,7 +14,7 @@ use embassy_rp::{
     clocks::clk_sys_freq,
     peripherals::{UART0, UART1},
     pwm::{self, Pwm},
-    uart::{BufferedInterruptHandler, BufferedUart, BufferedUartRx, Config},
+    uart::{BufferedInterruptHandler, BufferedUart, Config},
     watchdog::{ResetReason, Watchdog},
 };
 use embassy_time::Duration;
@@ -29,12 +31,21 @@ bind_interrupts!(struct Interrupts {
     UART1_IRQ => BufferedInterruptHandler<UART1>;
 });
 
-/// As this crate's features want it.
-const HERE: AppConfig = CONFIG.for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"));
+/// The lidar: a name of `beamfix lidars`; BEAMFIX_LIDAR=NAME builds for another.
+type Lidar = Row<{ chosen("ld06") }>;
+/// The task, and the most beams of a revolution.
+type Robot = OdometryWith<Lidar, { Lidar::BEAMS }>;
 
-static APP: ConstStaticCell<Board> = ConstStaticCell::new(Board::new(HERE));
+/// As this crate's features want it.
+const HERE: AppConfig = Lidar::CONFIG
+    .for_features(cfg!(feature = "demo"), cfg!(feature = "mavlink"))
+    .checked();
+
+static APP: ConstStaticCell<Place<Robot>> = ConstStaticCell::new(Place::EMPTY);
 /// What arrives while a match is computed: 178 ms of an LD06.
 static LIDAR: ConstStaticCell<[u8; 4096]> = ConstStaticCell::new([0; 4096]);
+/// Requests to it.
+static TO_LIDAR: ConstStaticCell<[u8; 32]> = ConstStaticCell::new([0; 32]);
 static COMMANDS: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
 static TELEMETRY: ConstStaticCell<[u8; 256]> = ConstStaticCell::new([0; 256]);
 
@@ -46,7 +57,16 @@ async fn main(_spawner: Spawner) {
         config.baudrate = baud;
         config
     };
-    let lidar = BufferedUartRx::new(p.UART1, Interrupts, p.PIN_5, LIDAR.take(), uart(LIDAR_BAUD));
+    let config = uart(Lidar::MODEL.baud);
+    let lidar = BufferedUart::new(
+        p.UART1,
+        p.PIN_4,
+        p.PIN_5,
+        Interrupts,
+        TO_LIDAR.take(),
+        LIDAR.take(),
+        config,
+    );
     let (pins, buffers) = ((p.PIN_0, p.PIN_1), (TELEMETRY.take(), COMMANDS.take()));
     let config = uart(TELEMETRY_BAUD);
     let (telemetry, commands) = BufferedUart::new(
@@ -66,11 +86,17 @@ async fn main(_spawner: Spawner) {
     watchdog.start(PATIENCE);
     let lines = Lines {
         lidar,
+        set_lidar_baud,
         commands,
         telemetry,
     };
-    run(APP.take(), &HERE, reset, lines, motor, || {
-        watchdog.feed(PATIENCE)
-    })
-    .await
+    let app = APP.take().odometry::<Lidar>(&HERE);
+    let feed = || watchdog.feed(PATIENCE);
+    run::<Lidar, _, _, _>(app, &HERE, reset, lines, motor, feed).await
+}
+
+fn set_lidar_baud(uart: &mut BufferedUart, baud: u32) {
+    // The last byte is still on its way.
+    while uart.busy() {}
+    uart.set_baudrate(baud);
 }

@@ -1,14 +1,15 @@
-//! What the Pico and the Pico 2 share: LD06 bytes in at GP5, commands at GP1, frames out at GP0, the motor's PWM at GP6;
-//! poses on the probe's log too.
+//! What the Pico and the Pico 2 share: the lidar's bytes in at GP5 and requests to it out at GP4, commands at GP1, frames out at
+//! GP0, the motor's PWM at GP6; poses on the probe's log too.
 #![no_std]
 
-use core::cell::RefCell;
+use core::{cell::RefCell, marker::PhantomData};
 
 use beamfix::geometry::Pose;
 use beamfix_app::{
-    App, AppConfig, LIDAR_BAUD, TELEMETRY_BAUD,
+    AppConfig, Firmware, Lidar, TELEMETRY_BAUD,
     ring::Ring,
     run::{self, Hardware, run},
+    task::Task,
     telemetry::Reset,
 };
 use critical_section::Mutex;
@@ -16,7 +17,7 @@ use embedded_io::Write as _;
 use hal::{
     Clock as _, Sio, Timer, Watchdog,
     clocks::init_clocks_and_plls,
-    fugit::{ExtU32 as _, RateExtU32 as _},
+    fugit::{ExtU32 as _, HertzU32, RateExtU32 as _},
     gpio::{
         FunctionPwm, FunctionUart, Pin, Pins, PullDown,
         bank0::{Gpio0, Gpio1, Gpio4, Gpio5},
@@ -36,7 +37,8 @@ const WATCHDOG_US: u32 = 1_000_000;
 const PWM_HZ: u32 = 30_000;
 
 type Uart<P> = Pin<P, FunctionUart, PullDown>;
-type LidarUart = Reader<pac::UART1, (Uart<Gpio4>, Uart<Gpio5>)>;
+type LidarPins = (Uart<Gpio4>, Uart<Gpio5>);
+type LidarUart = Reader<pac::UART1, LidarPins>;
 type OtherPins = (Uart<Gpio0>, Uart<Gpio1>);
 
 static LIDAR_UART: Mutex<RefCell<Option<LidarUart>>> = Mutex::new(RefCell::new(None));
@@ -46,7 +48,12 @@ static COMMAND_UART: Mutex<RefCell<Option<Reader<pac::UART0, OtherPins>>>> =
 static LIDAR: Ring<4096> = Ring::new();
 static COMMANDS: Ring<1024> = Ring::new();
 
-struct Board {
+struct Board<L> {
+    lidar: PhantomData<L>,
+    /// `None` only while its speed is changed.
+    to_lidar: Option<Writer<pac::UART1, LidarPins>>,
+    /// Of the UARTs.
+    clock: HertzU32,
     telemetry: Writer<pac::UART0, OtherPins>,
     #[cfg(target_arch = "arm")]
     timer: TheTimer,
@@ -59,7 +66,9 @@ type TheTimer = Timer<hal::timer::CopyableTimer0>;
 #[cfg(not(target_abi = "eabihf"))]
 type TheTimer = Timer;
 
-impl Hardware for Board {
+impl<L: Lidar> Hardware for Board<L> {
+    const ASKS: bool = L::ASKS;
+
     fn reset(&mut self) -> Reset {
         self.reset
     }
@@ -70,6 +79,27 @@ impl Hardware for Board {
 
     fn send(&mut self, bytes: &[u8]) {
         let _ = self.telemetry.write_all(bytes);
+    }
+
+    fn send_to_lidar(&mut self, bytes: &[u8]) {
+        if let Some(line) = &mut self.to_lidar {
+            let _ = line.write_all(bytes);
+            let _ = line.flush();
+        }
+    }
+
+    fn set_lidar_baud(&mut self, baud: u32) {
+        let Some(line) = self.to_lidar.take() else {
+            return;
+        };
+        self.to_lidar = critical_section::with(|cs| {
+            let mut uart = LIDAR_UART.borrow_ref_mut(cs);
+            let both = UartPeripheral::join(uart.take()?, line).disable();
+            let (mut lidar, line) = both.enable(uart_at(baud), self.clock).ok()?.split();
+            lidar.enable_rx_interrupt();
+            uart.replace(lidar);
+            Some(line)
+        });
     }
 
     fn feed_watchdog(&mut self) {
@@ -85,8 +115,11 @@ impl Hardware for Board {
     }
 }
 
-/// Sets the board up and runs the application.
-pub fn start<const N: usize>(app: &mut App<N>, config: &AppConfig) -> ! {
+/// Sets the board up and runs the application with the lidar L, which is the settings' one.
+pub fn start<L: Lidar, E: Task<N>, const N: usize>(
+    app: &mut Firmware<L::Parser, E, N>,
+    config: &AppConfig,
+) -> ! {
     let mut p = pac::Peripherals::take().expect("the first to take them");
     let mut core = cortex_m::Peripherals::take().expect("the first to take them");
     let reset = reset(&p.WATCHDOG);
@@ -109,16 +142,15 @@ pub fn start<const N: usize>(app: &mut App<N>, config: &AppConfig) -> ! {
     let sio = Sio::new(p.SIO);
     let pins = Pins::new(p.IO_BANK0, p.PADS_BANK0, sio.gpio_bank0, &mut p.RESETS);
     let clock = clocks.peripheral_clock.freq();
-    let uart = |baud: u32| UartConfig::new(baud.Hz(), DataBits::Eight, None, StopBits::One);
 
     let lidar_pins = (pins.gpio4.into_function(), pins.gpio5.into_function());
-    let (mut lidar, _) = UartPeripheral::new(p.UART1, lidar_pins, &mut p.RESETS)
-        .enable(uart(LIDAR_BAUD), clock)
+    let (mut lidar, to_lidar) = UartPeripheral::new(p.UART1, lidar_pins, &mut p.RESETS)
+        .enable(uart_at(config.lidar.baud), clock)
         .expect("a possible baud rate")
         .split();
     let other_pins = (pins.gpio0.into_function(), pins.gpio1.into_function());
     let (mut commands, telemetry) = UartPeripheral::new(p.UART0, other_pins, &mut p.RESETS)
-        .enable(uart(TELEMETRY_BAUD), clock)
+        .enable(uart_at(TELEMETRY_BAUD), clock)
         .expect("a possible baud rate")
         .split();
     lidar.enable_rx_interrupt();
@@ -148,9 +180,13 @@ pub fn start<const N: usize>(app: &mut App<N>, config: &AppConfig) -> ! {
     let mut motor = pwm.channel_a;
     let _: Pin<_, FunctionPwm, _> = motor.output_to(pins.gpio6);
 
-    defmt::info!("beamfix listens for an LD06 at {} baud", LIDAR_BAUD);
+    let (name, baud) = (config.lidar.name, config.lidar.baud);
+    defmt::info!("beamfix listens for {} at {} baud", name, baud);
     watchdog.start(WATCHDOG_US.micros());
     let board = Board {
+        lidar: PhantomData::<L>,
+        to_lidar: Some(to_lidar),
+        clock,
         telemetry,
         timer,
         watchdog,
@@ -159,6 +195,10 @@ pub fn start<const N: usize>(app: &mut App<N>, config: &AppConfig) -> ! {
     #[cfg(feature = "demo")]
     let board = beamfix_selftest::simulated::Simulated::new(board);
     run(app, config, (&LIDAR, &COMMANDS), board, motor)
+}
+
+fn uart_at(baud: u32) -> UartConfig {
+    UartConfig::new(baud.Hz(), DataBits::Eight, None, StopBits::One)
 }
 
 fn reset(watchdog: &pac::WATCHDOG) -> Reset {

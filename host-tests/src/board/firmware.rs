@@ -126,6 +126,8 @@ impl Firmware {
         let built = messages
             .lines()
             .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+            // The crate's program is built too, and may be told last.
+            .filter(|message| message["target"]["name"] == test)
             .filter_map(|message| Some(PathBuf::from(message["executable"].as_str()?)))
             .next_back();
         built.with_context(|| {

@@ -7,6 +7,7 @@ use host_tests::board::{
     real::REAL,
     real_card::RealCard,
 };
+use object::{Object as _, ObjectSection as _, SectionKind};
 
 #[test]
 #[cfg_attr(
@@ -93,4 +94,33 @@ fn no_firmware_of_a_real_board_grows() {
         );
     }
     risen.expect_none("card");
+}
+
+/// The application's place is all zeros: what lies in flash to be copied into RAM at the start is the HAL's alone.
+#[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
+fn no_application_is_copied_from_flash() {
+    let emulated = BOARDS.iter().map(|board| (&board.firmware, 0));
+    let real = REAL.iter().map(|board| (&board.firmware, 2048));
+    for (firmware, most) in emulated.chain(real) {
+        let elf = firmware
+            .build("")
+            .unwrap_or_else(|error| panic!("{error:#}"));
+        let bytes = std::fs::read(&elf).expect("the firmware");
+        let file = object::File::parse(&*bytes).expect("an ELF file");
+        let data: u64 = file
+            .sections()
+            .filter(|section| section.kind() == SectionKind::Data)
+            .map(|section| section.size())
+            .sum();
+        println!("{}: {data} bytes of first values", firmware.package);
+        assert!(
+            data <= most,
+            "{}: {data} bytes of first values",
+            firmware.package
+        );
+    }
 }

@@ -2,7 +2,7 @@
 #![no_std]
 #![no_main]
 
-use beamfix_app::{Place, Board};
+use beamfix_app::{Board, Place};
 use beamfix_emulated::{demo, finish};
 // The machine's memory and start.
 use qemu_m4f as _;
