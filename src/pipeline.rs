@@ -193,6 +193,7 @@ impl<P: Protocol, E: Estimator<N>, const N: usize> Pipeline<P, E, N> {
     }
 
     /// What stands behind the parser, at the end.
+    #[cfg(feature = "internals")]
     #[must_use]
     pub fn into_tracker(self) -> Tracker<E, N> {
         self.tracker

@@ -47,6 +47,13 @@ impl<P: Protocol> Protocol for Late<P> {
         }
     }
 
+    #[cfg(feature = "internals")]
+    fn set_zero(&mut self, zero_cdeg: u16) {
+        if let Some(parser) = self.as_mut() {
+            parser.set_zero(zero_cdeg);
+        }
+    }
+
     fn pending_bytes(&self) -> usize {
         self.as_ref().map_or(0, P::pending_bytes)
     }

@@ -92,6 +92,7 @@ impl<E, const N: usize> Tracker<E, N> {
     }
 
     /// The estimator alone, at the end.
+    #[cfg(feature = "internals")]
     #[must_use]
     pub fn into_estimator(self) -> E {
         self.estimator

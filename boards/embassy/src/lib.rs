@@ -71,6 +71,11 @@ pub async fn run<M: Lidar, E: Task<N>, const N: usize, L: Read + Write>(
                     Wanted::SetBaud(baud) => (lines.set_lidar_baud)(&mut lines.lidar, baud),
                 }
             }
+            if M::ASKS
+                && let Some(zero_cdeg) = starter.zero_cdeg()
+            {
+                app.set_zero(zero_cdeg);
+            }
         }
         #[cfg(feature = "demo")]
         simulate(app, &mut demo, &mut lines.telemetry, now_us).await;
