@@ -40,7 +40,7 @@ pub fn beams(array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Beam>> {
             ));
         }
         // The clock wraps at 2³² µs, as a lidar's does.
-        let micros = (seconds * 1e6).round().rem_euclid(4_294_967_296.0);
+        let micros = (seconds * 1e6).round() as i64;
         Ok(Beam {
             bearing: Bearing::from_radians(row[0].rem_euclid(std::f64::consts::TAU) as f32),
             range: Range::from_metres(row[1] as f32),

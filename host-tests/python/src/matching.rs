@@ -106,6 +106,8 @@ pub fn r#match(
     Match::new(py, &found)
 }
 
+/// Apart, so that what it costs can be told from what arrays cost.
+#[inline(never)]
 fn align<const N: usize>(
     reference: &[Beam],
     scan: &[Beam],
