@@ -6,7 +6,7 @@
 //! ```
 //!
 //! [`Pipeline`] takes bytes of a lidar, [`Tracker`] below it takes beams or whole scans, for logs without bytes. Which
-//! lidar and which estimator are types: [`Odometry`](crate::odometry::Odometry) needs nothing but scans,
+//! lidar and which estimator are types: [`Odometry`] needs nothing but scans,
 //! [`MapLocalizer`] a map too.
 //!
 //! Wheels, gyroscope and bytes have a time (µs, wrapping) on the caller's clock: [`Pipeline::set_time`] says when the bytes

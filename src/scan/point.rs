@@ -85,6 +85,6 @@ impl ScanPoint {
 impl From<ScanPoint> for Point {
     /// In the lidar's frame (m).
     fn from(point: ScanPoint) -> Self {
-        Self::new(f32::from(point.x) * 1e-3, f32::from(point.y) * 1e-3)
+        Self::new(f32::from(point.x) / 1000.0, f32::from(point.y) / 1000.0)
     }
 }
