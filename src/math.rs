@@ -169,37 +169,6 @@ pub const fn isqrt(n: u32) -> u32 {
     root
 }
 
-/// Whole square root, rounded down, of a number whose root is about `near`: exactly [`isqrt`], in a third of its
-/// instructions where `near` is between 256 and 32 767 and off by less than an eighth of itself.
-#[must_use]
-pub const fn isqrt_near(n: u32, near: u32) -> u32 {
-    if near < 256 || near > 32_767 {
-        return isqrt(n);
-    }
-    let mut root = near as i32;
-    let mut step = 0;
-    // Newton: the error of the table of reciprocals and the neglected square leave at most 2 after two steps, nearly always.
-    while step < 2 {
-        let off = (n as i32).wrapping_sub(root.wrapping_mul(root)) >> 8;
-        let twice = off.wrapping_mul(reciprocal(root as u32) as i32);
-        root += twice.wrapping_add(1 << 16) >> 17;
-        step += 1;
-    }
-    let least = (root - 2) as u32;
-    let mut k = 0;
-    while k < 4 {
-        // The last of five candidates whose square is not larger.
-        let next = least.wrapping_add(k + 1);
-        if next.wrapping_mul(next) > n {
-            break;
-        }
-        k += 1;
-    }
-    let root = least.wrapping_add(k);
-    let is_root = root < 32_768 && root * root <= n && n - root * root <= 2 * root;
-    if is_root { root } else { isqrt(n) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -224,23 +193,6 @@ mod tests {
         }
         assert!(wrap_angle(f32::NAN).is_nan());
         assert!(wrap_angle(f32::INFINITY).is_infinite());
-    }
-
-    #[test]
-    fn isqrt_near_is_isqrt() {
-        for n in (0..1_100_000_000u32)
-            .step_by(99_991)
-            .chain([u32::MAX, 1 << 31])
-        {
-            let root = isqrt(n);
-            for n in [n, root * root, (root * root).saturating_sub(1)] {
-                let root = isqrt(n);
-                for off in [-9000, -800, -63, -2, 0, 1, 70, 300, 5000, 70_000] {
-                    let near = root.saturating_add_signed(off);
-                    assert_eq!(isqrt_near(n, near), root, "{n}, {near}");
-                }
-            }
-        }
     }
 
     #[test]

@@ -12,6 +12,7 @@ pub mod beam;
 pub(crate) mod decimator;
 #[cfg(feature = "internals")]
 pub mod decimator;
+mod deskew;
 #[cfg(not(feature = "internals"))]
 pub(crate) mod mount;
 #[cfg(feature = "internals")]

@@ -63,7 +63,8 @@ impl<const N: usize> Odometry<N> {
     /// towards the surfaces of the keyframe before: so errors do not add up as long as these stay in sight.
     #[inline(never)]
     pub(super) fn keep(&mut self, outcome: &Result<Match, Refusal>, skew: &Covariance) {
-        /// A keyframe's points are in place in the middle of the scan: they are bent by a sixth of what its end is off.
+        /// A keyframe's points are in place in the middle of the scan: they are bent by a sixth of what its end is off, where
+        /// nothing on time told of the change.
         const BENT: f32 = 1.0 / 32.0;
         let (keyframe, scan) = (&mut self.keyframe, &mut self.deskewed);
         let motion = keyframe.pose.between(scan.pose);
@@ -82,7 +83,8 @@ impl<const N: usize> Odometry<N> {
         if matches!(outcome, Err(Refusal::NoMatch(_) | Refusal::TooFar { .. })) {
             self.covariance = self.covariance_when_lost();
         }
-        self.covariance = self.covariance.plus(&Covariance(skew.0.scaled(BENT)));
+        let bent = BENT * self.lateness.share();
+        self.covariance = self.covariance.plus(&Covariance(skew.0.scaled(bent)));
         self.keyframe.covariance = self.covariance;
         self.tracking = Tracking::at(self.pose, self.tracking.coasting);
         self.wheel_errors.interrupt();

@@ -3,6 +3,9 @@
 use super::Bearing;
 use crate::{geometry::Point, math};
 
+/// Longest range that a point may have (mm).
+pub(super) const MAX_RANGE_MM: u16 = 32_000;
+
 /// A place hit by a beam: 8 bytes, all integers.
 ///
 /// Direction, range and place always agree to a millimetre or two, which the bounds of the matchers' sums rest on: it is made by

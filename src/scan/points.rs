@@ -1,5 +1,6 @@
 //! The places hit by a scan's beams, in the frame of one moment.
 
+use super::{deskew::Deskew, point::MAX_RANGE_MM};
 use crate::{
     config::{self, ConfigError},
     geometry::Twist,
@@ -101,7 +102,7 @@ impl<const N: usize> Points<N> {
     pub fn assign(&mut self, scan: &Scan<N>, twist: Twist, config: &PointsConfig) {
         self.points.clear();
         let least = millimetres(config.min_range).max(1);
-        let sweep = Sweep {
+        let mut sweep = Sweep {
             least,
             span: millimetres(config.max_range).saturating_sub(least),
             flip: if config.mount.upside_down { 0xffff } else { 0 },
@@ -179,17 +180,17 @@ impl Sweep {
         ))
     }
 
+    #[inline]
     fn place<const N: usize>(
-        &self,
+        &mut self,
         (bearing, range, age): (u16, u16, u16),
         points: &mut heapless::Vec<ScanPoint, N>,
     ) {
         // In two's complement the negative is all bits flipped, and one more.
         let bearing = (bearing ^ self.flip).wrapping_add(self.flip & 1);
-        let point = ScanPoint::within(Bearing(bearing), range);
-        let moved = match &self.deskew {
-            Some(deskew) => deskew.apply(point, u32::from(self.last.saturating_sub(age)) << 4),
-            None => Some(point),
+        let moved = match &mut self.deskew {
+            Some(deskew) => deskew.apply(bearing, range, self.last.saturating_sub(age)),
+            None => Some(ScanPoint::within(Bearing(bearing), range)),
         };
         if let Some(point) = moved {
             // As many points as beams at most: it fits.
@@ -204,86 +205,10 @@ impl<const N: usize> Default for Points<N> {
     }
 }
 
-const MAX_RANGE_MM: u16 = 32_000;
-
 /// A limit in whole millimetres, within what a point can hold.
 fn millimetres(metres: f32) -> u16 {
     let mm = math::to_mm(metres);
     if mm > MAX_RANGE_MM { MAX_RANGE_MM } else { mm }
-}
-
-/// Motion of the lidar during the sweep, undone beam by beam.
-struct Deskew {
-    /// Turn per 2¹⁶ µs (2⁻³² turn).
-    turn: i32,
-    /// Translation per 2¹⁶ µs, in the frame at the scan's end (1/1024 mm).
-    x: i32,
-    y: i32,
-}
-
-impl Deskew {
-    /// `None` where the motion over the sweep is too small to matter (0.1 mm, 0.001°), or faster than any robot (40 rad/s, 100 m/s).
-    fn new(twist: Twist, duration: f32) -> Option<Self> {
-        const TICK: f32 = 0.065_536;
-        let motion = twist.displacement(duration);
-        let still = motion.distance() < 1e-4 && math::abs(motion.theta) < 2e-5;
-        let speed = math::abs(twist.vx) + math::abs(twist.vy);
-        // The negated form refuses NaN too.
-        if still || !(math::abs(twist.omega) < 40.0 && speed < 100.0) {
-            return None;
-        }
-        Some(Self {
-            turn: math::round_to_i32(
-                twist.omega * TICK * (4_294_967_296.0 / core::f32::consts::TAU),
-            ),
-            x: math::round_to_i32(twist.vx * TICK * 1_024_000.0),
-            y: math::round_to_i32(twist.vy * TICK * 1_024_000.0),
-        })
-    }
-
-    /// The point seen from where the lidar is `age` µs later; `None` where it leaves the numbers' range.
-    fn apply(&self, point: ScanPoint, age: u32) -> Option<ScanPoint> {
-        // The pose at the beam's time, seen from the scan's end: back by the twist over `age`. To second order the
-        // translation of an arc is that of the chord at half its turn.
-        let age = i64::from(if age > 2_000_000 { 2_000_000 } else { age });
-        let turn = -((i64::from(self.turn) * age) >> 16);
-        let (tx, ty) = (
-            (-(i64::from(self.x) * age) >> 16) as i32,
-            (-(i64::from(self.y) * age) >> 16) as i32,
-        );
-        let (half_s, half_c) = math::sin_cos_q15((turn >> 17) as u16);
-        let (mx, my) = (
-            mul_q15(tx, half_c) - mul_q15(ty, half_s),
-            mul_q15(tx, half_s) + mul_q15(ty, half_c),
-        );
-        let (s, c) = math::sin_cos_q15((turn >> 16) as u16);
-        let (px, py) = (i32::from(point.x), i32::from(point.y));
-        let x = ((px * c - py * s) >> 5).wrapping_add(mx);
-        let y = ((px * s + py * c) >> 5).wrapping_add(my);
-        let (x, y) = ((x + 512) >> 10, (y + 512) >> 10);
-        let square = (x.wrapping_mul(x) as u32).wrapping_add(y.wrapping_mul(y) as u32);
-        let limit = i32::from(MAX_RANGE_MM);
-        if !(-limit..=limit).contains(&x) || !(-limit..=limit).contains(&y) || square > 0x3d09_0000
-        {
-            return None;
-        }
-        Some(ScanPoint {
-            x: x as i16,
-            y: y as i16,
-            bearing: Bearing(math::atan2_turn(y, x)),
-            range: math::isqrt_near(square, u32::from(point.range)) as u16,
-        })
-    }
-}
-
-/// Product with a Q15 factor, rounded down.
-fn mul_q15(a: i32, q15: i32) -> i32 {
-    // Seldom more than 16 bits (64 mm): a Cortex-M0 has no wider product.
-    if a == i32::from(a as i16) {
-        (a * q15) >> 15
-    } else {
-        ((i64::from(a) * i64::from(q15)) >> 15) as i32
-    }
 }
 
 #[cfg(test)]
@@ -379,6 +304,10 @@ mod tests {
                     dx.abs() < 2.0 && dy.abs() < 2.0,
                     "{twist:?}: off by ({dx}, {dy}) mm"
                 );
+                // In polar form it is the same place.
+                let polar = ScanPoint::at(p.bearing, p.range);
+                let (dx, dy) = (p.x.abs_diff(polar.x), p.y.abs_diff(polar.y));
+                assert!(dx < 2 && dy < 2, "{twist:?}: {p:?}, {polar:?}");
             }
         }
     }
@@ -387,16 +316,15 @@ mod tests {
     fn an_impossible_twist_is_ignored() {
         let mut points = Points::<8>::new();
         let scan = scan(&[(0.0, 1.0, 0), (90.0, 2.0, 100_000)]);
-        for omega in [f32::NAN, f32::INFINITY, 1e9] {
-            points.assign(
-                &scan,
-                Twist {
-                    vx: 0.0,
-                    vy: 0.0,
-                    omega,
-                },
-                &PointsConfig::DEFAULT,
-            );
+        // The last one is a robot's, but for what its turn makes of its speed.
+        for (vx, omega) in [
+            (0.0, f32::NAN),
+            (0.0, f32::INFINITY),
+            (0.0, 1e9),
+            (64.0, 39.0),
+        ] {
+            let twist = Twist { vx, vy: 0.0, omega };
+            points.assign(&scan, twist, &PointsConfig::DEFAULT);
             assert_eq!(
                 (points.as_slice()[0].x, points.as_slice()[0].y),
                 (1000, 0),

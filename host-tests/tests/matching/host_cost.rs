@@ -9,12 +9,12 @@ use host_tests::formats::bytes;
 use host_tests::shared;
 
 /// Most instructions a match, from the beams of both scans to the pose.
-const ALLOWED: u64 = 380_000;
+const ALLOWED: u64 = 425_000;
 
 /// Pairs at level 0 of the recorded scans of 180 beams, from the wheels' guess.
 #[test]
 #[cfg_attr(debug_assertions, ignore = "a debug build counts other things")]
-fn a_match_of_180_beams_costs_at_most_380_000_instructions() {
+fn a_match_of_180_beams_costs_at_most_425_000_instructions() {
     let (Some(scans), Some(list)) = (
         shared::file("pairs/host/scans_intel.txt.gz"),
         shared::file("pairs/host/pairs_intel_cons.csv.gz"),

@@ -125,9 +125,9 @@ fn the_pose_is_as_far_off_as_it_says() {
         "second half of 8 drives: {:.2} cm, {degrees:.3}°; normalised squared error {normalised:.2}",
         100.0 * metres
     );
-    assert!(metres < 0.02 && degrees < 0.25);
-    // 3 where the covariance says the truth.
-    assert!(normalised > 1.5 && normalised < 5.0);
+    assert!(metres < 0.014 && degrees < 0.12);
+    // 3 where the covariance says the truth; less, as it allows for more at turns than goes wrong there.
+    assert!(normalised > 1.2 && normalised < 5.0);
 }
 
 #[test]

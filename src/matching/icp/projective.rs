@@ -146,7 +146,7 @@ fn search<const N: usize>(
         points,
         start,
         lever_shift: accumulate::lever_shift(points, start),
-        sigma: u32::from(reference.sigma()),
+        noise: reference.noise(),
         is_decided: guess.is_decided,
         rivals: guess.rivals,
         config,
@@ -166,7 +166,7 @@ pub fn smooth_towards<const N: usize>(
     pose: Pose,
 ) {
     if let Some(at) = FixedPose::new(pose) {
-        let sigma = u32::from(reference.sigma());
+        let sigma = u32::from(reference.noise().sigma);
         smoothing::smooth_towards(reference.lines(), points, at, sigma);
     }
 }

@@ -110,7 +110,7 @@ impl Pace {
 impl Task<'_> {
     /// Width of the last gate (mm).
     fn fine_width(&self) -> u32 {
-        self.sigma * FINE_FIFTHS / 5
+        u32::from(self.noise.sigma) * FINE_FIFTHS / 5
     }
 
     /// A pass over every other eight points by the last gate.
@@ -250,7 +250,7 @@ impl Task<'_> {
     /// What a pose is worth by at most `beams` points.
     pub fn judged(&self, Reached { at, passes }: Reached, beams: u16) -> Candidate {
         let stride = self.stride(beams);
-        let score = score::judge(self.lines, self.points, at, stride, self.sigma);
+        let score = score::judge(self.lines, self.points, at, stride, self.noise);
         Candidate {
             at,
             passes,

@@ -180,7 +180,7 @@ fn is_sure(task: &Task<'_>, converged: &Refined) -> bool {
 /// Whether the place is known better than a range is.
 fn is_sharp(task: &Task<'_>, found: &Refined) -> bool {
     let sums = &found.sums;
-    let (residual, range) = (sums.residual(), task.sigma as f32 * 1e-3);
+    let (residual, range) = (sums.residual(), f32::from(task.noise.sigma) * 1e-3);
     let curvature = sums.curvature(task.lever_shift, found.candidate.at);
     curvature.inverse().is_some_and(|spread| {
         let square = math::max(spread.xx, spread.yy) * sums.inflation() * residual * residual;
@@ -342,7 +342,7 @@ fn slide(task: &Task<'_>, race: &mut Race, found: &Refined) {
     const LEVER: f32 = 3.0;
     let curvature = found.sums.curvature(task.lever_shift, found.candidate.at);
     let [(least, [x, y, t]), _, _] = curvature.theta_scaled(1.0 / LEVER).eigen();
-    if least < task.config.min_constraint_share * found.sums.total_weight() {
+    if least < task.least_curvature(&found.sums) {
         // Nothing is known along it: the guess decides.
         return;
     }

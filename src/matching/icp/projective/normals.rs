@@ -7,7 +7,7 @@ use crate::{
     matching::icp::projective::{
         line::Line,
         line_fit::{FEWEST, Laid, MOST, Noise, Sums, few},
-        range_noise,
+        range_noise::{self, RangeNoise},
     },
     math::{self, reciprocal},
     scan::{
@@ -49,7 +49,9 @@ const fn weights() -> [u16; 34] {
 /// What the scan's beams decide of how lines are laid.
 #[derive(Clone, Copy)]
 struct Scale {
-    noise: Noise,
+    noise: RangeNoise,
+    /// By the usual range.
+    usual: Noise,
     gap: Gap,
     /// Most lines from one neighbour to the next that are filled between.
     fill: usize,
@@ -61,40 +63,47 @@ impl Scale {
         let mut gap = Gap::WALL;
         let two_beams = (2 * 65_536 / (count as u32).max(1)).min(WIDEST_GAP) as u16;
         gap.widest = gap.widest.max(two_beams);
-        let sigma = u32::from(range_noise::sigma(points, gap.widest));
+        let noise = range_noise::estimate(points, gap.widest);
+        let sigma = u32::from(noise.sigma);
         // Neighbours of one surface are one range apart, whose noise is that of two.
         gap.mm = gap.mm.max(6 * sigma);
         Self {
-            noise: Noise::new(sigma),
+            noise,
+            usual: Noise::new(sigma),
             gap,
             fill: (3 * bins / (2 * count)).max(WIDEST_FILL),
         }
     }
 }
 
-/// Fills `lines` from `points`; gives the number of points that have one, and the standard deviation of a range (mm).
-pub(super) fn lay(lines: &mut [Line], points: &[ScanPoint]) -> (u16, u16) {
+/// Fills `lines` from `points`; gives the number of points that have one, and the noise of the ranges.
+pub(super) fn lay(lines: &mut [Line], points: &[ScanPoint]) -> (u16, RangeNoise) {
     lines.fill(Line::NONE);
     let grid = Grid::new(lines.len());
     let scale = Scale::new(points, lines.len());
     let mut rest = points;
-    while let Some((run, others)) = rest.split_at_checked(run_length(rest, scale.gap)) {
+    while let Some((run, others)) = rest.split_at_checked(run_length(rest, scale)) {
         if run.is_empty() {
             break;
         }
         lay_run(lines, run, grid, scale);
         rest = others;
     }
-    (points.len() as u16, scale.noise.sigma as u16)
+    (points.len() as u16, scale.noise)
 }
 
 /// Number of points from the first on that lie on one surface, by their ranges: [`Gap::run_length`] by places would cost
 /// two products a point.
-fn run_length(points: &[ScanPoint], gap: Gap) -> usize {
+fn run_length(points: &[ScanPoint], Scale { noise, gap, .. }: Scale) -> usize {
     let breaks = points.windows(2).position(|pair| {
         let [a, b] = pair else { return true };
         let step = u32::from(a.range.abs_diff(b.range));
-        !gap.joins(turn_between(a, b), a.range.min(b.range), step)
+        let range = a.range.min(b.range);
+        let mut gap = gap;
+        if noise.share > 0 {
+            gap.mm = gap.mm.max(6 * noise.at(range));
+        }
+        !gap.joins(turn_between(a, b), range, step)
     });
     breaks.map_or(points.len(), |at| at + 1)
 }
@@ -166,13 +175,18 @@ fn lay_run(lines: &mut [Line], run: &[ScanPoint], grid: Grid, scale: Scale) {
             continue;
         }
         let inverse = reciprocal(u32::from(point.range));
-        let half = density.half_window(inverse, HALF_WINDOW_SIGMAS * scale.noise.sigma);
+        let noise = if scale.noise.share == 0 {
+            scale.usual
+        } else {
+            Noise::new(scale.noise.at(point.range))
+        };
+        let half = density.half_window(inverse, HALF_WINDOW_SIGMAS * noise.sigma);
         sums.reach(i);
         let laid = sums
-            .lay(i, half, scale.noise)
-            .unwrap_or_else(|| few(run, i, point, inverse, scale.noise));
+            .lay(i, half, noise)
+            .unwrap_or_else(|| few(run, i, point, inverse, noise));
         if let Some(slot) = lines.get_mut(bin) {
-            store(slot, point, &laid, inverse, grid);
+            store(slot, point, &laid, (inverse, scale.noise), grid);
         }
         fill_between(lines, before, bin, scale.fill);
         before = Some(bin);
@@ -180,12 +194,22 @@ fn lay_run(lines: &mut [Line], run: &[ScanPoint], grid: Grid, scale: Scale) {
 }
 
 /// Weights the normal and finds what leads to the line's place among the others.
-fn store(slot: &mut Line, point: &ScanPoint, laid: &Laid, inverse: u32, grid: Grid) {
+fn store(
+    slot: &mut Line,
+    point: &ScanPoint,
+    laid: &Laid,
+    (inverse, noise): (u32, RangeNoise),
+    grid: Grid,
+) {
     let (px, py) = (i32::from(point.x), i32::from(point.y));
     // A point whose range is not its distance, which no scan has, gives a wrong line: hence the wrapping.
     // |cos β| = |n · p| / |p|: Q10.
     let cos = ((laid.nx * px + laid.ny * py).unsigned_abs() >> 8).wrapping_mul(inverse) >> 16;
-    let weight = i32::from(WEIGHT.get((cos >> 5) as usize).copied().unwrap_or(1000));
+    let mut weight = i32::from(WEIGHT.get((cos >> 5) as usize).copied().unwrap_or(1000));
+    if noise.share > 0 {
+        // By the standard deviation of this range, too: up to twice as much, down to a sixth.
+        weight = weight * i32::from(noise.sigma) / (noise.at(point.range) as i32).max(1);
+    }
     // Direction, and lines per radian over the distance: Q15 and Q16 a millimetre.
     let pull = ((((inverse >> 4) * grid.per_radian) >> 10).min(16_383)) as i32;
     let towards = |p: i32| ((p.wrapping_mul(inverse as i32) >> 9).wrapping_mul(pull) >> 15) as i16;

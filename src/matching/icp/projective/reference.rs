@@ -1,7 +1,7 @@
 //! What a scan is matched against: a line for each direction, found without a search.
 
 use crate::{
-    matching::icp::projective::{line::Line, normals},
+    matching::icp::projective::{line::Line, normals, range_noise::RangeNoise},
     scan::ScanPoint,
 };
 
@@ -13,7 +13,7 @@ pub struct Reference<const N: usize> {
     lines: [Line; N],
     count: u16,
     directions: u16,
-    sigma: u16,
+    noise: RangeNoise,
 }
 
 impl<const N: usize> Reference<N> {
@@ -28,7 +28,7 @@ impl<const N: usize> Reference<N> {
         lines: [Line::ZERO; N],
         count: 0,
         directions: 0,
-        sigma: 0,
+        noise: RangeNoise::NONE,
     };
 
     /// No lines; `directions` of them, at most N: matches do not depend on N then, only on this.
@@ -37,7 +37,7 @@ impl<const N: usize> Reference<N> {
         Self {
             lines: Self::no_lines(),
             count: 0,
-            sigma: 0,
+            noise: RangeNoise::NONE,
             directions: Self::at_most_n(directions),
         }
     }
@@ -45,7 +45,7 @@ impl<const N: usize> Reference<N> {
     /// The same in its place.
     pub(crate) fn restart(&mut self, directions: u16) {
         self.lines.fill(Line::NONE);
-        (self.count, self.sigma) = (0, 0);
+        (self.count, self.noise) = (0, RangeNoise::NONE);
         self.directions = Self::at_most_n(directions);
     }
 
@@ -77,9 +77,9 @@ impl<const N: usize> Reference<N> {
         self.count
     }
 
-    /// Standard deviation of a range (mm), as the scan itself shows it.
-    pub(super) const fn sigma(&self) -> u16 {
-        self.sigma
+    /// Standard deviation of a range, as the scan itself shows it.
+    pub(super) const fn noise(&self) -> RangeNoise {
+        self.noise
     }
 
     /// Whether there is no line at all.
@@ -94,7 +94,7 @@ impl<const N: usize> Reference<N> {
     pub fn assign(&mut self, points: &[ScanPoint]) {
         let directions = usize::from(self.directions);
         let lines = self.lines.get_mut(..directions).unwrap_or_default();
-        (self.count, self.sigma) = normals::lay(lines, points);
+        (self.count, self.noise) = normals::lay(lines, points);
     }
 }
 

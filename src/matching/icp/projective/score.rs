@@ -1,7 +1,9 @@
 //! How well a pose explains a scan, independent of how the pose was found.
 
 use crate::{
-    matching::icp::projective::{accumulate::Projection, fixed_pose::FixedPose, line::Line},
+    matching::icp::projective::{
+        accumulate::Projection, fixed_pose::FixedPose, line::Line, range_noise::RangeNoise,
+    },
     math::{reciprocal, rough_length},
     scan::ScanPoint,
 };
@@ -38,10 +40,10 @@ pub(super) fn judge(
     points: &[ScanPoint],
     at: FixedPose,
     stride: u16,
-    sigma: u32,
+    noise: RangeNoise,
 ) -> Score {
     let mut projection = Projection::new(lines, at);
-    let per_mm = 1024 / sigma.max(1);
+    let usual = 1024 / u32::from(noise.sigma).max(1);
     let mut score = Score::default();
     for point in points.iter().step_by(usize::from(stride).max(1)) {
         let placed = projection.place(point);
@@ -58,6 +60,11 @@ pub(super) fn judge(
             .unsigned_abs()
             >> 10;
         let distance = weighted.saturating_mul(reciprocal(rough_length(mx, my)) >> 4) >> 10;
+        let per_mm = if noise.share == 0 {
+            usual
+        } else {
+            1024 / noise.at(point.range).max(1)
+        };
         let step = (distance.saturating_mul(per_mm) >> 8) as usize;
         if let Some(agreement) = AGREEMENT.get(step) {
             score.agreement += u32::from(*agreement);

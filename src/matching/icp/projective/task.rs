@@ -2,7 +2,10 @@
 
 use crate::{
     geometry::Pose,
-    matching::icp::projective::{config::IcpConfig, fixed_pose::FixedPose, line::Line},
+    matching::icp::projective::{
+        config::IcpConfig, fixed_pose::FixedPose, line::Line, normal_equations::Sums,
+        range_noise::RangeNoise,
+    },
     scan::ScanPoint,
 };
 
@@ -32,10 +35,30 @@ pub(super) struct Task<'a> {
     pub points: &'a [ScanPoint],
     pub start: FixedPose,
     pub lever_shift: u32,
-    /// Standard deviation of a range (mm).
-    pub sigma: u32,
+    /// Standard deviation of a range.
+    pub noise: RangeNoise,
     /// Whether the guess decides between places near by.
     pub is_decided: bool,
     pub rivals: Rivals,
     pub config: &'a IcpConfig,
+}
+
+impl Task<'_> {
+    /// Curvature below which a direction is not determined: a share of what all points together would have head on.
+    pub fn least_curvature(&self, sums: &Sums) -> f32 {
+        self.config.min_constraint_share * self.mean_square_weight() * sums.total_weight()
+    }
+
+    /// Mean square of the weights that lines have by the noise of their ranges: 1 where that is the same at any range.
+    fn mean_square_weight(&self) -> f32 {
+        if self.noise.share == 0 {
+            return 1.0;
+        }
+        let usual = f32::from(self.noise.sigma);
+        let square = |point: &ScanPoint| {
+            let weight = usual / self.noise.at(point.range) as f32;
+            weight * weight
+        };
+        self.points.iter().map(square).sum::<f32>() / self.points.len() as f32
+    }
 }

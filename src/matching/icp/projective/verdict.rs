@@ -34,7 +34,7 @@ pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match
     let open = degeneracy::find(
         &h.theta_scaled(1.0 / lever),
         lever,
-        config.min_constraint_share * sums.total_weight(),
+        task.least_curvature(sums),
     )?;
     let mut pose = best.candidate.at.pose();
     if let Some(open) = &open {
