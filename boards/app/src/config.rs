@@ -71,6 +71,7 @@ impl AppConfig {
         let output = match (demo, mavlink) {
             #[cfg(feature = "mavlink")]
             (_, true) => Output::Mavlink,
+            #[cfg(feature = "text")]
             (true, _) => Output::Text,
             _ => self.output,
         };
@@ -114,6 +115,7 @@ pub enum Output {
     /// The frames of [`link`](crate::link): everything of [`telemetry`](crate::telemetry).
     Frames,
     /// Lines for a terminal: poses and health.
+    #[cfg(feature = "text")]
     Text,
     /// MAVLink 2: poses as `ODOMETRY`, scans as `OBSTACLE_DISTANCE`.
     #[cfg(feature = "mavlink")]

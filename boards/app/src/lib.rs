@@ -21,6 +21,7 @@ pub mod run;
 pub mod starter;
 pub mod supervisor;
 pub mod task;
+#[cfg(feature = "text")]
 pub mod text;
 
 use beamfix::{

@@ -19,8 +19,9 @@ use crate::{
     supervisor::Care,
     task::{Task, Told},
     telemetry::{self, Gyro, Mounted, PIECE, Piece, Raw, Telemetry, Wheels},
-    text,
 };
+#[cfg(feature = "text")]
+use crate::text;
 
 /// Revolutions between two health messages.
 const HEALTH_EVERY: u32 = 16;
@@ -258,6 +259,7 @@ impl Report {
             Output::Frames => {
                 let _ = link::append(message, &mut self.out);
             }
+            #[cfg(feature = "text")]
             Output::Text => text::append(message, &mut self.out),
             #[cfg(feature = "mavlink")]
             Output::Mavlink => {

@@ -18,6 +18,8 @@ pub struct Firmware {
     pub package: &'static str,
     target: &'static str,
     feature: &'static str,
+    /// Whether it is built for size, not as its profile says.
+    is_small: bool,
     /// Whether the firmware is linked only if no panic can be reached.
     is_proven: bool,
 }
@@ -30,6 +32,7 @@ impl Firmware {
             package,
             target,
             feature: "",
+            is_small: false,
             is_proven: false,
         }
     }
@@ -38,6 +41,13 @@ impl Firmware {
     #[must_use]
     pub const fn with(self, feature: &'static str) -> Self {
         Self { feature, ..self }
+    }
+
+    /// The same, built for size.
+    #[must_use]
+    pub const fn small(self) -> Self {
+        let is_small = true;
+        Self { is_small, ..self }
     }
 
     /// The same, where its programs without semihosting link only if no panic can be reached.
@@ -67,10 +77,10 @@ impl Firmware {
         let folder = target_dir
             .join("elf")
             .join(self.package)
-            .join(if self.feature.is_empty() {
-                "plain"
-            } else {
-                self.feature
+            .join(match (self.feature, self.is_small) {
+                ("", true) => "small",
+                ("", false) => "plain",
+                (feature, _) => feature,
             });
         fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
         let kept = folder.join(program);
@@ -92,9 +102,11 @@ impl Firmware {
         debug: &str,
     ) -> Result<PathBuf> {
         let folder = root().join("boards").join(self.package);
+        let size = ["--config", "profile.release.opt-level=\"z\""];
         let output = cargo()
             .args(["build", "--release", "--bin", program])
             .args(options)
+            .args(if self.is_small { &size[..] } else { &[] })
             .env("CARGO_PROFILE_RELEASE_DEBUG", debug)
             .arg("--target-dir")
             .arg(target_dir)

@@ -31,10 +31,14 @@ pub struct Real {
     ram_bytes: u64,
     /// Where the chip shows it: begin and end.
     ram: &'static [(u64, u64)],
+    /// How long its ring holds what an LD06 sends (ms).
+    ring_ms: f64,
 }
 
 const CORTEX_M0: f64 = 1.5;
 const CORTEX_M4: f64 = 1.25;
+/// Few instructions of a Cortex-M3 take longer than those of a Cortex-M4; it needs fewer than the Cortex-M0 that is emulated.
+const CORTEX_M3: f64 = 1.25;
 const RAM_2000: &[(u64, u64)] = &[(0x2000_0000, 0x2010_0000)];
 
 /// All there are.
@@ -49,6 +53,7 @@ pub const REAL: &[Real] = &[
         flash_bytes: 512 << 10,
         ram_bytes: 128 << 10,
         ram: RAM_2000,
+        ring_ms: 178.0,
     },
     Real {
         name: "pico",
@@ -60,6 +65,7 @@ pub const REAL: &[Real] = &[
         flash_bytes: 2 << 20,
         ram_bytes: 264 << 10,
         ram: RAM_2000,
+        ring_ms: 178.0,
     },
     Real {
         name: "pico-embassy",
@@ -71,6 +77,7 @@ pub const REAL: &[Real] = &[
         flash_bytes: 2 << 20,
         ram_bytes: 264 << 10,
         ram: RAM_2000,
+        ring_ms: 178.0,
     },
     Real {
         name: "pico2",
@@ -82,6 +89,7 @@ pub const REAL: &[Real] = &[
         flash_bytes: 4 << 20,
         ram_bytes: 520 << 10,
         ram: RAM_2000,
+        ring_ms: 178.0,
     },
     Real {
         name: "nrf52840-dk",
@@ -94,6 +102,7 @@ pub const REAL: &[Real] = &[
         flash_bytes: 1 << 20,
         ram_bytes: 256 << 10,
         ram: RAM_2000,
+        ring_ms: 178.0,
     },
     Real {
         name: "esp32-c3",
@@ -105,6 +114,31 @@ pub const REAL: &[Real] = &[
         flash_bytes: 4 << 20,
         ram_bytes: 400 << 10,
         ram: &[(0x3fc8_0000, 0x3fd0_0000), (0x4037_0000, 0x4040_0000)],
+        ring_ms: 178.0,
+    },
+    Real {
+        name: "esp32-c6",
+        firmware: Firmware::new("esp32-c6", "riscv32imac-unknown-none-elf"),
+        emulated: "rv32",
+        clock_mhz: 160,
+        cycles: CORTEX_M4,
+        byte: BYTE,
+        flash_bytes: 4 << 20,
+        ram_bytes: 512 << 10,
+        ram: &[(0x4080_0000, 0x4088_0000)],
+        ring_ms: 178.0,
+    },
+    Real {
+        name: "bluepill",
+        firmware: Firmware::new("bluepill", "thumbv7m-none-eabi"),
+        emulated: "m0z",
+        clock_mhz: 72,
+        cycles: CORTEX_M3,
+        byte: BYTE,
+        flash_bytes: 64 << 10,
+        ram_bytes: 20 << 10,
+        ram: RAM_2000,
+        ring_ms: 89.0,
     },
 ];
 
@@ -117,8 +151,6 @@ const BYTES: f64 = 17_625.0;
 const BYTE: f64 = 600.0;
 /// The same with embassy, whose task is woken for each byte or two (38 % there).
 const BYTE_BY_AWAIT: f64 = 1250.0;
-/// How long the boards' rings hold what an LD06 sends (ms).
-const RING_MS: f64 = 178.0;
 
 impl Real {
     /// The board of this name.
@@ -135,7 +167,7 @@ impl Real {
         let share_percent = busy_ms / 10.0;
         let longest_ms = ms(core.instructions_max as f64);
         let fits = ram_bytes + core.stack_bytes < self.ram_bytes && flash_bytes < self.flash_bytes;
-        let verdict = if !fits || share_percent > 90.0 || longest_ms > RING_MS {
+        let verdict = if !fits || share_percent > 90.0 || longest_ms > self.ring_ms {
             Verdict::No
         } else if share_percent > 50.0 || longest_ms > 1000.0 / RATE {
             Verdict::Marginal

@@ -2,7 +2,7 @@
 
 use crate::common::figures::Risen;
 use host_tests::board::{
-    BOARDS,
+    BOARDS, SMALL,
     card::{Card, drive_commands, measure},
     real::REAL,
     real_card::RealCard,
@@ -19,7 +19,7 @@ fn no_figure_rises() {
         serde_json::from_str(include_str!("../../golden/card.json")).expect("a list of cards");
     let commands = drive_commands();
     let mut risen = Risen::default();
-    for board in BOARDS {
+    for board in BOARDS.iter().chain([&SMALL]) {
         let now = measure(board, &commands).unwrap_or_else(|error| panic!("{error:#}"));
         println!("{now:?}");
         let before = golden
