@@ -1,6 +1,7 @@
 //! The emulated boards: what they are, how their firmware is built and run.
 
 pub mod bench;
+pub mod bytes;
 pub mod card;
 pub mod commands;
 pub mod drivers;

@@ -93,6 +93,7 @@ impl<P: Protocol, const N: usize> Place<Firmware<P, Odometry<N>, N>> {
         pipeline: Pipeline::ZERO,
         commands: link::Receiver::new(),
         piece: NO_PIECE,
+        piece_bytes: 0,
         lidar_bytes: 0,
         report: Report::ZERO,
     });
@@ -109,12 +110,14 @@ impl<P: Protocol, const N: usize> Place<Firmware<P, Odometry<N>, N>> {
             pipeline,
             commands,
             piece,
+            piece_bytes,
             lidar_bytes,
             report,
         } = app;
         pipeline.set_up(L::PARSER, config.odometry);
         *commands = link::Receiver::new();
         *piece = NO_PIECE;
+        *piece_bytes = 0;
         *lidar_bytes = 0;
         *report = Report::new(config);
         app
@@ -125,8 +128,10 @@ impl<P: Protocol, const N: usize> Place<Firmware<P, Odometry<N>, N>> {
 pub struct Firmware<P: Protocol, E, const N: usize> {
     pipeline: Pipeline<Late<P>, E, N>,
     commands: link::Receiver,
-    /// The bytes of the lidar that came in last, together, and when.
+    /// The bytes of the lidar that came in last, together, where they are recorded, and when.
     piece: Raw,
+    /// How many there are, recorded or not.
+    piece_bytes: usize,
     /// Bytes of the lidar taken; wraps.
     lidar_bytes: u32,
     report: Report,
@@ -156,6 +161,7 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
             pipeline: Pipeline::new(Late::Given(lidar), task),
             commands: link::Receiver::new(),
             piece: NO_PIECE,
+            piece_bytes: 0,
             lidar_bytes: 0,
             report: Report::new(config),
         }
@@ -230,7 +236,11 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
             }
             let part = rest.get(..room).unwrap_or(rest);
             let count = self.pipeline.push_packet(part, &mut self.report);
-            let _ = (self.piece.bytes).extend_from_slice(part.get(..count).unwrap_or_default());
+            if self.report.record {
+                let taken = part.get(..count).unwrap_or_default();
+                let _ = self.piece.bytes.extend_from_slice(taken);
+            }
+            self.piece_bytes += count;
             taken += count;
         }
         self.lidar_bytes = self.lidar_bytes.wrapping_add(taken as u32);
@@ -260,10 +270,11 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
     fn room_in_piece(&mut self) -> usize {
         let now_us = self.report.now_us;
         let waited_us = now_us.wrapping_sub(self.piece.time_us);
-        if self.piece.bytes.is_full() || self.piece.bytes.is_empty() || waited_us > PIECE_US {
+        let most = self.piece.bytes.capacity();
+        if self.piece_bytes >= most || self.piece_bytes == 0 || waited_us > PIECE_US {
             self.end_piece();
         }
-        self.piece.bytes.capacity() - self.piece.bytes.len()
+        most.saturating_sub(self.piece_bytes)
     }
 
     /// Sends the bytes that came in together, if they are recorded; what comes in from now on belongs to a new piece.
@@ -273,6 +284,7 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
             self.report.send_raw(&self.piece);
         }
         self.piece.bytes.clear();
+        self.piece_bytes = 0;
         self.piece.time_us = self.report.now_us;
         self.pipeline.set_time(self.report.now_us);
     }

@@ -14,14 +14,14 @@ use heapless::Vec;
 use crate::mavlink;
 #[cfg(feature = "truth")]
 use crate::telemetry::Truth;
+#[cfg(feature = "text")]
+use crate::text;
 use crate::{
     AppConfig, Output, link,
     supervisor::Care,
     task::{Task, Told},
     telemetry::{self, Gyro, Mounted, PIECE, Piece, Raw, Telemetry, Wheels},
 };
-#[cfg(feature = "text")]
-use crate::text;
 
 /// Revolutions between two health messages.
 const HEALTH_EVERY: u32 = 16;

@@ -107,6 +107,7 @@ fn go_round<
     app.set_time(now_us);
     hardware.simulate(now_us, lidar);
     if supervisor.is_due(now_us) {
+        app.set_bytes_lost(lidar.lost());
         let mut care = supervisor.look(now_us, app.seen());
         if H::ASKS {
             starter.look(now_us, &mut care);
@@ -133,16 +134,15 @@ fn go_round<
             app.set_zero(zero_cdeg);
         }
     }
-    app.set_bytes_lost(lidar.lost());
     // A piece of each in turn, the lidar's first: a flood of commands takes no more than its share of the time.
-    let mut idle = true;
+    let mut drained = true;
+    let mut bytes = [0; PIECE];
     for is_lidar in [true, false] {
-        let mut bytes = [0; PIECE];
         let count = match is_lidar {
             true => lidar.read(&mut bytes),
             false => commands.read(&mut bytes),
         };
-        idle &= count == 0;
+        drained &= count < PIECE;
         let mut rest = bytes.get(..count).unwrap_or_default();
         if H::ASKS && is_lidar {
             starter.heard(rest);
@@ -165,7 +165,7 @@ fn go_round<
         }
     }
     // A search in a map goes on where nothing else is to be done.
-    if idle && app.work(WORK) {
+    if drained && app.work(WORK) {
         // Looked at once more with interrupts masked: a byte that came just now would not wake the sleeper.
         // A masked interrupt that is pending does.
         critical_section::with(|_| {

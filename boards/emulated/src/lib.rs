@@ -5,6 +5,7 @@
 #![no_std]
 
 pub mod bench;
+pub mod bytes;
 #[cfg(feature = "demo")]
 pub mod demo;
 pub mod drivers;

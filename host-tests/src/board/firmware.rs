@@ -74,14 +74,15 @@ impl Firmware {
         };
         let options = ["--features", self.feature, "--features", proof];
         let built = self.compile(program, &options, &target_dir, "0")?;
-        let folder = target_dir
-            .join("elf")
-            .join(self.package)
-            .join(match (self.feature, self.is_small) {
-                ("", true) => "small",
-                ("", false) => "plain",
-                (feature, _) => feature,
-            });
+        let folder =
+            target_dir
+                .join("elf")
+                .join(self.package)
+                .join(match (self.feature, self.is_small) {
+                    ("", true) => "small",
+                    ("", false) => "plain",
+                    (feature, _) => feature,
+                });
         fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
         let kept = folder.join(program);
         fs::copy(&built, &kept).with_context(|| built.display().to_string())?;

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Result, bail};
 use beamfix::lidar::Model;
 use host_tests::board::{
-    BOARDS, Board, SMALL,
+    BOARDS, Board, SMALL, bytes,
     card::{self, Card},
     drivers, maps,
     real::{REAL, Real},
@@ -96,6 +96,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         real_cards.extend(core.map(|core| real.measure(core)).transpose()?);
         bar.inc(1);
     }
+    let bytes = match with_drivers {
+        true => bytes::measure()?,
+        false => Vec::new(),
+    };
     let drivers = match with_drivers {
         true => drivers::measure_all(|| bar.inc(1))?,
         false => Vec::new(),
@@ -114,6 +118,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     for row in value.as_array_mut().into_iter().flatten() {
         if row["board"] == "m0" {
             row["drivers"] = serde_json::to_value(&drivers)?;
+            for cost in &bytes {
+                row[format!("instructions_per_byte_by_{}", cost.piece)] = cost.instructions.into();
+            }
         }
         let board = row["board"].clone();
         for costs in maps.fields.iter().filter(|costs| board == costs.board) {
@@ -133,17 +140,26 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let text = if args.json {
         json
     } else {
-        text(&cards, &real_cards, &drivers, &maps)
+        text(&cards, &real_cards, (&bytes, &drivers), &maps)
     };
     output::report(false, &value, &text)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn text(cards: &[Card], real: &[RealCard], drivers: &[drivers::Cost], maps: &maps::Card) -> String {
+fn text(
+    cards: &[Card],
+    real: &[RealCard],
+    (bytes, drivers): (&[bytes::Cost], &[drivers::Cost]),
+    maps: &maps::Card,
+) -> String {
     let mut text = table(cards);
     if !real.is_empty() {
         text += "\n\n";
         text += &real_table(real);
+    }
+    if !bytes.is_empty() {
+        text += "\n\n";
+        text += &bytes::text(bytes);
     }
     if !drivers.is_empty() {
         text += "\n\n";
