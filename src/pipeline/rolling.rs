@@ -72,10 +72,13 @@ impl<const N: usize, const K: usize, const B: usize, const V: usize> Estimator<N
     fn update(&mut self, scan: &Scan<N>, ego: EgoMotion) -> RollingStep {
         let odometry = self.odometry.update(scan, ego);
         let points = self.odometry.points().as_slice();
+        // What is told besides is the motion within this scan: the next match corrects it, so that it does not add up.
+        let settled = *self.odometry.settled_covariance();
+        let within = odometry.covariance.0.plus(&settled.0.scaled(-1.0));
         let rolled = self.map.update(
             &Told {
                 pose: odometry.pose,
-                covariance: odometry.covariance,
+                covariance: settled,
                 is_measured: odometry.outcome.is_ok(),
                 is_keyframe: odometry.keyframe,
                 companions: odometry
@@ -87,7 +90,7 @@ impl<const N: usize, const K: usize, const B: usize, const V: usize> Estimator<N
         );
         RollingStep {
             pose: rolled.pose,
-            covariance: rolled.covariance,
+            covariance: rolled.covariance.plus(&Covariance(within)),
             is_matched: rolled.is_matched,
             odometry,
         }
