@@ -1,4 +1,5 @@
-/* An emulated board: bytes from input.bin, text to standard output, through semihosting. No C library is needed. */
+/* An emulated board: bytes from input.bin, text to standard output, through semihosting. No C library is needed. With SHOW_STACK the
+ * program ends with a line that says how many bytes of the stack were never touched. */
 #include "../examples/platform.h"
 
 enum { SYS_OPEN = 1, SYS_WRITE0 = 4, SYS_READ = 6, SYS_EXIT = 0x18, SYS_EXIT_EXTENDED = 0x20 };
@@ -43,15 +44,46 @@ void platform_print(const char *text) {
     semihost(SYS_WRITE0, text);
 }
 
+extern uint32_t data_start[], data_end[], data_load[], bss_start[], bss_end[], stack_top[];
+
+#if defined(SHOW_STACK)
+enum { PAINT = 0xc5c5c5c5 };
+
+/* Paints what is free below the caller's frame. */
+static void paint_stack(void) {
+    volatile uint32_t here = 0;
+    volatile uint32_t *word;
+    for (word = bss_end; word + 16 < &here; word++) {
+        *word = PAINT;
+    }
+}
+
+static void show_stack(void) {
+    static char line[] = "stack left: 00000000\n";
+    const volatile uint32_t *word;
+    uint32_t left = 0;
+    int k;
+    for (word = bss_end; word < stack_top && *word == PAINT; word++) {
+        left += sizeof *word;
+    }
+    for (k = 0; k < 8; k++) {
+        line[12 + k] = "0123456789abcdef"[(left >> (28 - 4 * k)) & 15];
+    }
+    platform_print(line);
+}
+#endif
+
 static void leave(int status) {
     static uintptr_t arguments[2] = {0x20026, 0}; /* the application's own exit */
     arguments[1] = (uintptr_t)status;
+#if defined(SHOW_STACK)
+    show_stack();
+#endif
     semihost(SYS_EXIT_EXTENDED, arguments);
     for (;;) {
     }
 }
 
-extern uint32_t data_start[], data_end[], data_load[], bss_start[], bss_end[], stack_top[];
 int main(void);
 
 /* Where the machine starts, once it has a stack. */
@@ -64,6 +96,9 @@ void start(void) {
     for (to = bss_start; to < bss_end;) {
         *to++ = 0;
     }
+#if defined(SHOW_STACK)
+    paint_stack();
+#endif
 #if defined(__ARM_FP)
     /* The floating-point unit on: CPACR. */
     *(volatile uint32_t *)0xe000ed88 |= 0xfu << 20;

@@ -40,8 +40,8 @@
 #define BEAMFIX_BEAMS 1100
 
 // The same for objects of the functions whose names end in `_small`, for a microcontroller with 16 KB of RAM: of an LD06's 450
-// beams the last 20, or 16 degrees, are given up.
-#define BEAMFIX_SMALL_BEAMS 412
+// beams the last 66, or 53 degrees, are given up, so that the stack fits too.
+#define BEAMFIX_SMALL_BEAMS 384
 
 // Memory for odometry with any lidar (bytes).
 #define BEAMFIX_ODOMETRY_BYTES 36600
@@ -50,7 +50,7 @@
 #define BEAMFIX_SMALL_ODOMETRY_BYTES 17600
 
 // The same with one of LDROBOT's lidars (LD06, LD19, STL-19P, ...), whose packets are short.
-#define BEAMFIX_LDROBOT_SMALL_ODOMETRY_BYTES 12900
+#define BEAMFIX_LDROBOT_SMALL_ODOMETRY_BYTES 12120
 
 // Memory for localization (bytes), with any lidar; a map takes BEAMFIX_MAP_BYTES(width, height) more.
 #define BEAMFIX_LOCALIZATION_BYTES 28600

@@ -13,14 +13,14 @@ pub const BEAMFIX_ALIGN: usize = 8;
 /// Most beams of a revolution; further ones are refused and counted.
 pub const BEAMFIX_BEAMS: usize = 1100;
 /// The same for objects of the functions whose names end in `_small`, for a microcontroller with 16 KB of RAM: of an LD06's 450
-/// beams the last 20, or 16 degrees, are given up.
-pub const BEAMFIX_SMALL_BEAMS: usize = 412;
+/// beams the last 66, or 53 degrees, are given up, so that the stack fits too.
+pub const BEAMFIX_SMALL_BEAMS: usize = 384;
 /// Memory for odometry with any lidar (bytes).
 pub const BEAMFIX_ODOMETRY_BYTES: usize = 36_600;
 /// Memory for odometry with BEAMFIX_SMALL_BEAMS (bytes), with any lidar.
 pub const BEAMFIX_SMALL_ODOMETRY_BYTES: usize = 17_600;
 /// The same with one of LDROBOT's lidars (LD06, LD19, STL-19P, ...), whose packets are short.
-pub const BEAMFIX_LDROBOT_SMALL_ODOMETRY_BYTES: usize = 12_900;
+pub const BEAMFIX_LDROBOT_SMALL_ODOMETRY_BYTES: usize = 12_120;
 /// Memory for localization (bytes), with any lidar; a map takes BEAMFIX_MAP_BYTES(width, height) more.
 pub const BEAMFIX_LOCALIZATION_BYTES: usize = 28_600;
 /// The same with BEAMFIX_SMALL_BEAMS (bytes).

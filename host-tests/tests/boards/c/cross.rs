@@ -65,6 +65,11 @@ pub const BOARDS: [Board; 4] = [
 impl Board {
     /// Compiles an example; `None` where a tool is missing.
     pub fn compile(&self, into: &Path, example: &[&Path]) -> Option<PathBuf> {
+        self.compile_with(into, example, &[])
+    }
+
+    /// The same with more flags.
+    fn compile_with(&self, into: &Path, example: &[&Path], flags: &[&str]) -> Option<PathBuf> {
         let emulator = self.emulator.first()?;
         if !has(self.compiler) || !has(emulator) {
             println!("left out: the C example on {}", self.name);
@@ -73,6 +78,7 @@ impl Board {
         let program = into.join(self.name);
         run(Command::new(self.compiler)
             .args(self.flags)
+            .args(flags)
             .args([
                 "-std=gnu99",
                 "-Os",
@@ -118,6 +124,42 @@ fn the_c_example_finds_the_hosts_poses_on_every_core() {
             expected,
             "{}",
             board.name
+        );
+    }
+}
+
+/// Fewest bytes of the stack that the C example must never touch on the board with 16 KB of RAM.
+const LEFT: u32 = 64;
+
+/// It once ran out of stack, and its poses were wrong without a word.
+#[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the library is always a release build"
+)]
+fn the_c_example_has_stack_left_on_the_board_with_16_kb() {
+    let folder = folder("stack");
+    // Five revolutions, five from before them: from one to the other no match is found, and every start is tried.
+    let bytes = capture();
+    let jumping: Vec<u8> = bytes.chunks(190 * 47).rev().flatten().copied().collect();
+    let board = BOARDS.iter().find(|board| board.name == "m0");
+    let board = board.expect("it is there");
+    let example = sources().join("examples/replay.c");
+    let Some(program) = board.compile_with(&folder, &[&example], &["-DSHOW_STACK"]) else {
+        return;
+    };
+    for (what, bytes) in [("a drive", bytes), ("jumps", jumping)] {
+        fs::write(folder.join("input.bin"), &bytes).expect("the capture");
+        let said = emulate(board, &program, &folder);
+        let left = said
+            .lines()
+            .find_map(|line| line.strip_prefix("stack left: "))
+            .and_then(|left| u32::from_str_radix(left, 16).ok());
+        let left = left.unwrap_or_else(|| panic!("{what}: {said}"));
+        println!("{what}: {left} bytes of the stack are left");
+        assert!(
+            left >= LEFT,
+            "{what}: {left} bytes of the stack are left, {LEFT} must be"
         );
     }
 }

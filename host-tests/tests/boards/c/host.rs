@@ -17,7 +17,7 @@ use host_tests::report::hash::PoseHash;
 use super::tools::{archive, folder, has, run, sources};
 
 /// Beams of an object of the functions that end in `_small`.
-const SMALL_BEAMS: usize = 412;
+const SMALL_BEAMS: usize = 384;
 
 /// Bytes of a simulated LD06, carried for 20 s.
 pub fn capture() -> Vec<u8> {
