@@ -55,7 +55,8 @@ pub struct Match {
     /// How well the pose explains the scan: about 1 where every beam agrees, 0 where none does, negative where the
     /// reference saw through what the scan hit. Each matcher has its own measure: compare scores of one matcher only.
     pub score: f32,
-    /// Root mean square distance of the inliers from the reference's lines (m).
+    /// Root of the weighted mean square distance of the points from the reference's lines (m); where noise grows with the range,
+    /// distances are scaled to what they would be at a usual range.
     pub residual: f32,
     /// The direction that the scene hardly determines, if there is one.
     pub degenerate_direction: Option<DegenerateDirection>,

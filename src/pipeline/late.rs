@@ -1,8 +1,8 @@
-//! A parser that is given when the program runs, so that the room for it is all zeros before.
+//! What is given when the program runs, so that the room for it is all zeros before.
 
 use crate::lidar::{Counters, Protocol, Survey};
 
-/// A lidar's parser, or none yet. Without one, bytes are taken and lead to nothing.
+/// Something given when the program runs, or nothing yet. A lidar's parser that is not given takes bytes, and they lead to nothing.
 // Numbered, so that `Missing` is zero whatever P is: `Option` would mark it within P where it finds a place.
 #[derive(Debug, Clone, Copy)]
 #[repr(u8)]
@@ -14,7 +14,7 @@ pub enum Late<P> {
 }
 
 impl<P> Late<P> {
-    /// The parser, if it was given.
+    /// It, if it was given.
     pub(super) const fn as_ref(&self) -> Option<&P> {
         match self {
             Self::Missing => None,

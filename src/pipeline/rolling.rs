@@ -88,9 +88,12 @@ impl<const N: usize, const K: usize, const B: usize, const V: usize> Estimator<N
             self.robot_from_lidar,
             points,
         );
+        // The map's axes are turned against those of odometry by what the map has corrected.
+        let corrected = Pose::new(0.0, 0.0, rolled.pose.theta - odometry.pose.theta);
+        let within = Covariance(within).rotated(corrected);
         RollingStep {
             pose: rolled.pose,
-            covariance: rolled.covariance.plus(&Covariance(within)),
+            covariance: rolled.covariance.plus(&within),
             is_matched: rolled.is_matched,
             odometry,
         }

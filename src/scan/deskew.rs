@@ -115,7 +115,7 @@ impl Deskew {
         }
         let Stretch { end, more, .. } = self.stretch;
         let part = i32::from(age) & ((1 << STRETCH_BITS) - 1);
-        // In 8 ms a robot moves less than a metre and turns less than a sixth: these stay in 32 bits.
+        // In 8 ms a robot moves less than a metre and turns by less than 20°: these stay in 32 bits.
         let turn = end.turn.wrapping_add((more.turn >> STRETCH_BITS) * part);
         let x = end.x + ((more.x * part) >> STRETCH_BITS);
         let y = end.y + ((more.y * part) >> STRETCH_BITS);

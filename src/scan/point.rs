@@ -8,8 +8,8 @@ pub(super) const MAX_RANGE_MM: u16 = 32_000;
 
 /// A place hit by a beam: 8 bytes, all integers.
 ///
-/// Direction, range and place always agree to a millimetre or two, which the bounds of the matchers' sums rest on: it is made by
-/// [`ScanPoint::at`] alone.
+/// Direction, range and place always agree to a millimetre or two, which the bounds of the matchers' sums rest on: outside this crate it is
+/// made by [`ScanPoint::at`] alone.
 ///
 /// ```
 /// use beamfix::{geometry::Point, scan::{Bearing, ScanPoint}};
@@ -31,16 +31,13 @@ pub struct ScanPoint {
 }
 
 impl ScanPoint {
-    /// The farthest range (mm).
-    const FARTHEST: u16 = 32_000;
-
     /// The point `range` millimetres away; one farther off than 32 000 is put there.
     #[must_use]
     pub const fn at(bearing: Bearing, range: u16) -> Self {
-        let range = if range < Self::FARTHEST {
+        let range = if range < MAX_RANGE_MM {
             range
         } else {
-            Self::FARTHEST
+            MAX_RANGE_MM
         };
         Self::within(bearing, range)
     }
@@ -56,6 +53,7 @@ impl ScanPoint {
             range,
         }
     }
+
     /// Forward of the lidar (mm).
     #[must_use]
     #[cfg(feature = "internals")]

@@ -109,7 +109,7 @@ impl<const B: usize> Inner<B> {
         count
     }
 
-    /// A place in the buffer, for one less than its length behind its end.
+    /// Where the byte `at` is in the buffer; `at` is less than twice its length.
     fn wrapped(at: usize) -> usize {
         let at = if at < B { at } else { at - B };
         at.min(B)

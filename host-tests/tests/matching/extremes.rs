@@ -15,8 +15,26 @@ fn number(noise: &mut Noise, ends: &[u16]) -> u16 {
     ends.get(pick).copied().unwrap_or(any)
 }
 
-/// Points on one surface by their ranges, or wherever they come to lie; in the order of measurement, or in none.
+/// A room whose far half errs by a share of its ranges.
+fn noisy_room(noise: &mut Noise, count: u16) -> Vec<ScanPoint> {
+    let (near, far) = (noise.even(3000.0, 8000.0), noise.even(12_000.0, 32_000.0));
+    let share = noise.even(0.0, 0.08);
+    (0..count)
+        .map(|k| {
+            let bearing = (65_536 * u32::from(k) / u32::from(count)) as u16;
+            let range = if k < count / 2 { near } else { far };
+            let range = range + share * range * noise.normal(1.0);
+            ScanPoint::at(Bearing(bearing), range.clamp(1.0, 65_535.0) as u16)
+        })
+        .collect()
+}
+
+/// Points on one surface by their ranges, or wherever they come to lie, in the order of measurement, or in none; a fourth of them a
+/// room whose noise grows with the range.
 fn points(noise: &mut Noise, count: u16) -> Vec<ScanPoint> {
+    if noise.even(0.0, 1.0) < 0.25 {
+        return noisy_room(noise, count);
+    }
     let (joined, ordered) = (noise.even(0.0, 1.0) < 0.7, noise.even(0.0, 1.0) < 0.7);
     let ends = [0, 1, 2, 50, 127, 1000, 32_000, 32_767, 65_535];
     let range = number(noise, &ends);

@@ -74,7 +74,8 @@ fn minute(model: RingModel, seed: u64) -> Outcome {
     outcome
 }
 
-/// Settings were chosen by looking at these drives too: this keeps what was reached, and `other_drives` shows what it is worth.
+/// Settings were chosen by looking at these drives too: this keeps what was reached, and `other_drives` shows what it is worth. Since lines are
+/// weighed by the noise of their range, drive 10 is 3.35° off at a turn of the flat for a moment; of the drives that nobody chose by, 30 of 32 are within.
 #[test]
 #[cfg_attr(debug_assertions, ignore = "drives of a minute")]
 fn a_ring_of_64_beams_follows_a_minute_in_the_flat() {

@@ -12,7 +12,7 @@
 //! | --- | --- | --- |
 //! | selection | every k-th point while coarse, one half and then the other at the end | `descent` |
 //! | matching | projection: the line that the reference saw in the point's direction | `accumulate::Projection` |
-//! | weighting | noise of the range seen across the surface; Geman–McClure | `normals`, `accumulate` |
+//! | weighting | noise of the range seen across the surface, and by the range where it grows; Geman–McClure | `normals`, `accumulate` |
 //! | rejection | a gate that narrows | `accumulate` |
 //! | error metric | point to line | `accumulate` |
 //! | minimisation | Gauss–Newton, `f32`, until steps are a fraction of the standard deviation | `normal_equations`, `descent` |
@@ -54,7 +54,7 @@ use task::Task;
 ///
 /// `guess` is where the search starts and what the result keeps along a direction that the scene does not determine. The
 /// score is the mean agreement of the overlapping points with the reference (1 on its lines, half at four standard deviations of
-/// a range), less a half for each that the reference saw through. At most 0.38 million instructions for 180 points and lines on
+/// a range), less a half for each that the reference saw through. At most 0.43 million instructions for 180 points and lines on
 /// a PC (`host-tests/tests/matching/host_cost.rs`), more where the guess is bad.
 ///
 /// ```
@@ -147,6 +147,7 @@ fn search<const N: usize>(
         start,
         lever_shift: accumulate::lever_shift(points, start),
         noise: reference.noise(),
+        mean_square: task::mean_square_weight(points, reference.noise()),
         is_decided: guess.is_decided,
         rivals: guess.rivals,
         config,
@@ -166,7 +167,6 @@ pub fn smooth_towards<const N: usize>(
     pose: Pose,
 ) {
     if let Some(at) = FixedPose::new(pose) {
-        let sigma = u32::from(reference.noise().sigma);
-        smoothing::smooth_towards(reference.lines(), points, at, sigma);
+        smoothing::smooth_towards(reference.lines(), points, at, reference.noise());
     }
 }

@@ -222,7 +222,7 @@ pub(super) fn residual(line: &Line, placed: Placed, gate: Gate) -> Option<(i32, 
         return None;
     }
     let e = (i32::from(line.mx) * dx + i32::from(line.my) * dy + 512) >> 10;
-    // Below 2¹⁹, and the factor is below 2¹⁵: a product too large for 32 bits is held at the end.
+    // Below 2²⁰, and the factor is below 2¹⁵: a product too large for 32 bits is held at the end.
     let weight = KERNEL.get((e.unsigned_abs().saturating_mul(gate.0) >> 16) as usize)?;
     Some((e, i32::from(*weight)))
 }

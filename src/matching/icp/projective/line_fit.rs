@@ -31,7 +31,8 @@ impl Noise {
     pub fn new(sigma: u32) -> Self {
         Self {
             sigma,
-            flat: (FLAT_TENTHS * sigma / 10) as i32,
+            // So that a window's sum times 2¹⁶/n stays in 32 bits.
+            flat: (FLAT_TENTHS * sigma / 10).min(2047) as i32,
         }
     }
 }

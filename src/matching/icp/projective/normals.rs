@@ -214,13 +214,18 @@ fn store(
     let pull = ((((inverse >> 4) * grid.per_radian) >> 10).min(16_383)) as i32;
     let towards = |p: i32| ((p.wrapping_mul(inverse as i32) >> 9).wrapping_mul(pull) >> 15) as i16;
     *slot = Line {
-        qx: (px + ((laid.nx * laid.offset + (1 << 13)) >> 14)) as i16,
-        qy: (py + ((laid.ny * laid.offset + (1 << 13)) >> 14)) as i16,
+        qx: foot(px, laid.nx * laid.offset),
+        qy: foot(py, laid.ny * laid.offset),
         mx: ((laid.nx * weight + 512) >> 10) as i16,
         my: ((laid.ny * weight + 512) >> 10) as i16,
         ux: towards(px),
         uy: towards(py),
     };
+}
+
+/// A coordinate of a point moved to its line (mm): -32 768 would be no line.
+fn foot(place: i32, moved: i32) -> i16 {
+    (place + ((moved + (1 << 13)) >> 14)).clamp(-32_767, 32_767) as i16
 }
 
 /// Gives the lines between two neighbours on one surface, where there are more lines than points, to the nearer one of

@@ -8,7 +8,7 @@ use crate::scan::{
 /// Standard deviation of a range, as a scan itself shows it, by the range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct RangeNoise {
-    /// Of half of the ranges, about (mm): 10 to 80, to 160 where it grows.
+    /// Of a usual range (mm): 10 to 80, to 160 where it grows.
     pub sigma: u8,
     /// What it grows by with the range, Q12; 0 where it is the same at any range.
     pub share: u8,
@@ -19,7 +19,7 @@ impl RangeNoise {
     pub const NONE: Self = Self { sigma: 0, share: 0 };
 
     /// Standard deviation (mm) of a range (mm). Half of the usual one and what grows; at most six times the usual one, so
-    /// that what is weighed by it keeps its bits.
+    /// that normals weighed by it stay longer than 128, which their reciprocal wants.
     #[inline(always)]
     pub fn at(self, range: u16) -> u32 {
         let usual = u32::from(self.sigma);
@@ -39,7 +39,7 @@ const LEAST: u32 = 10;
 const LARGEST: u32 = 80;
 /// Largest where it grows with the range: 3.5 % of 5 m.
 const LARGEST_GROWN: u32 = 160;
-/// Two ranges two beams apart may differ by this part of the range and by twice their distance: more than noise of 3.5 % of it, and
+/// Two ranges two beams apart may differ by a sixteenth of the range and by twice their distance: more than noise of 3.5 % of it, and
 /// walls seen at less than about 70°.
 const NOISY: u32 = 16;
 /// Places that are looked at, about: the estimate is then good to a tenth.
@@ -122,11 +122,11 @@ fn sigma(counts: impl Iterator<Item = u32>, all: u32, by: &Quantile) -> u32 {
     0
 }
 
-/// Standard deviation of a range, from 10 to 80 mm, and what it grows by where that is seen.
+/// Standard deviation of a usual range, from 10 to 80 mm, and what it grows by where that is seen: to 160 mm then.
 ///
 /// A range is compared with that of the straight line through its neighbours' places, whatever angle it is seen at: 1/r
 /// changes linearly with sine and cosine of the bearing, so that `r = 2 cos δ · ab/(a + b)` for neighbours at `a` and `b`,
-/// δ to both sides. The median of the differences does not see corners, edges and people.
+/// δ to both sides. Neighbours that lie on no wall are left out, and medians do not see what corners and people are left.
 /// Neighbours are at most `gap` (1/65536 turn) apart.
 pub(super) fn estimate(points: &[ScanPoint], gap: u16) -> RangeNoise {
     let stride = (points.len() / ENOUGH).max(1);
@@ -296,7 +296,7 @@ mod tests {
             sigma: 160,
             share: 255,
         };
-        assert_eq!((noise.at(0), noise.at(u16::MAX)), (80, 960));
+        assert_eq!((noise.at(0), noise.at(32_000)), (80, 960));
         // Steps follow one another without a gap.
         for difference in 0..1100u32 {
             let step = step_of(difference).min(STEPS - 1);
@@ -311,8 +311,7 @@ mod tests {
         // 5.6° apart: the ranges themselves differ by decimetres.
         let points: [ScanPoint; 16] = core::array::from_fn(|k| {
             let bearing = Bearing(((k as i32 - 8) * 1024) as u16);
-            let (sin, cos) = crate::math::sin_cos(bearing.radians() - 0.3);
-            let _ = sin;
+            let (_, cos) = crate::math::sin_cos(bearing.radians() - 0.3);
             ScanPoint::at(bearing, (3000.0 / crate::math::max(cos, 0.2)) as u16)
         });
         let noise = estimate(&points, 2048);

@@ -43,7 +43,8 @@ pub(super) fn judge(
     noise: RangeNoise,
 ) -> Score {
     let mut projection = Projection::new(lines, at);
-    let usual = 1024 / u32::from(noise.sigma).max(1);
+    // Q16; 1024 times 64 for all ranges alike, which most lidars' are.
+    let usual = (1024 / u32::from(noise.sigma).max(1)) << 6;
     let mut score = Score::default();
     for point in points.iter().step_by(usize::from(stride).max(1)) {
         let placed = projection.place(point);
@@ -63,9 +64,9 @@ pub(super) fn judge(
         let per_mm = if noise.share == 0 {
             usual
         } else {
-            1024 / noise.at(point.range).max(1)
+            (1 << 16) / noise.at(point.range).max(1)
         };
-        let step = (distance.saturating_mul(per_mm) >> 8) as usize;
+        let step = (distance.saturating_mul(per_mm) >> 14) as usize;
         if let Some(agreement) = AGREEMENT.get(step) {
             score.agreement += u32::from(*agreement);
             score.close += 1;

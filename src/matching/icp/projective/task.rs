@@ -37,6 +37,8 @@ pub(super) struct Task<'a> {
     pub lever_shift: u32,
     /// Standard deviation of a range.
     pub noise: RangeNoise,
+    /// See [`mean_square_weight`].
+    pub mean_square: f32,
     /// Whether the guess decides between places near by.
     pub is_decided: bool,
     pub rivals: Rivals,
@@ -46,19 +48,19 @@ pub(super) struct Task<'a> {
 impl Task<'_> {
     /// Curvature below which a direction is not determined: a share of what all points together would have head on.
     pub fn least_curvature(&self, sums: &Sums) -> f32 {
-        self.config.min_constraint_share * self.mean_square_weight() * sums.total_weight()
+        self.config.min_constraint_share * self.mean_square * sums.total_weight()
     }
+}
 
-    /// Mean square of the weights that lines have by the noise of their ranges: 1 where that is the same at any range.
-    fn mean_square_weight(&self) -> f32 {
-        if self.noise.share == 0 {
-            return 1.0;
-        }
-        let usual = f32::from(self.noise.sigma);
-        let square = |point: &ScanPoint| {
-            let weight = usual / self.noise.at(point.range) as f32;
-            weight * weight
-        };
-        self.points.iter().map(square).sum::<f32>() / self.points.len() as f32
+/// Mean square of the weights that lines have by the noise of their ranges: 1 where that is the same at any range.
+pub(super) fn mean_square_weight(points: &[ScanPoint], noise: RangeNoise) -> f32 {
+    if noise.share == 0 {
+        return 1.0;
     }
+    let usual = f32::from(noise.sigma);
+    let square = |point: &ScanPoint| {
+        let weight = usual / noise.at(point.range) as f32;
+        weight * weight
+    };
+    points.iter().map(square).sum::<f32>() / points.len() as f32
 }
