@@ -261,6 +261,8 @@ fn compete(
 
 /// Makes the fine passes of the candidates and takes the one that is worth most; refuses as ambiguous if another is nearly as
 /// good.
+// Apart: what it holds need not lie below the starts on the stack.
+#[inline(never)]
 fn settle(
     task: &Task<'_>,
     first: Result<Refined, MatchError>,

@@ -15,6 +15,8 @@ use crate::{
 const FLOOR: (f32, f32) = (0.0005, 0.0001);
 
 /// Judges the best candidate and keeps the guess along a direction that the scene does not determine.
+// Apart: what it holds need not lie below the passes on the stack.
+#[inline(never)]
 pub(super) fn verdict(task: &Task<'_>, best: &Best, guess: Pose) -> Result<Match, MatchError> {
     let config = task.config;
     if best.sums.inliers < config.min_inliers {
