@@ -59,8 +59,9 @@ impl<const N: usize> Odometry<N> {
         }
     }
 
-    /// Makes the scan just placed the keyframe, its pose uncertain by `skew` besides. Where its pose is known in all directions its points are first moved
-    /// towards the surfaces of the keyframe before: so errors do not add up as long as these stay in sight.
+    /// Makes the scan just placed the keyframe, its pose uncertain by a share of `skew` besides. Where its pose is known in all
+    /// directions its points are first moved towards the surfaces of the keyframe before: so errors do not add up as long as these
+    /// stay in sight.
     #[inline(never)]
     pub(super) fn keep(&mut self, outcome: &Result<Match, Refusal>, skew: &Covariance) {
         /// A keyframe's points are in place in the middle of the scan: they are bent by a sixth of what its end is off, where

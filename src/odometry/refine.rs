@@ -17,7 +17,8 @@ use crate::{
 
 impl<const N: usize> Odometry<N> {
     /// Fuses match and prior, and places the robot there. If the match implies another velocity than the scan was deskewed
-    /// with, deskews and matches again first. How much more the wheels missed than before of the rotation since the last scan (rad).
+    /// with, deskews and matches again first. Gives how much more of the rotation since the last scan (rad) the wheels missed than of
+    /// the one before; 0 without wheels.
     #[inline(never)]
     pub(super) fn refine(
         &mut self,

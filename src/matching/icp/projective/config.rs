@@ -30,8 +30,8 @@ pub struct IcpConfig {
     pub min_score: f32,
     /// Standard deviation of a range (m): the least noise that the covariance assumes. Default 0.005.
     pub min_range_sigma: f32,
-    /// A direction counts as degenerate if it is told by less than this share of what all beams would tell head on. Default 0.01: in a corridor normals
-    /// that are good to 2.7° make it 0.002, and what stands out of the walls as much again.
+    /// A direction counts as degenerate if it is told by less than this share of what all beams would tell head on. Default 0.01:
+    /// in a corridor normals that are good to 2.7° make it 0.002, and what stands out of the walls as much again.
     pub min_constraint_share: f32,
 }
 

@@ -207,7 +207,7 @@ fn store(
     let cos = ((laid.nx * px + laid.ny * py).unsigned_abs() >> 8).wrapping_mul(inverse) >> 16;
     let mut weight = i32::from(WEIGHT.get((cos >> 5) as usize).copied().unwrap_or(1000));
     if noise.share > 0 {
-        // By the standard deviation of this range, too: up to twice as much, down to a sixth.
+        // By the standard deviation of this range, too: a sixth to 2.2 times as much.
         weight = weight * i32::from(noise.sigma) / (noise.at(point.range) as i32).max(1);
     }
     // Direction, and lines per radian over the distance: Q15 and Q16 a millimetre.
