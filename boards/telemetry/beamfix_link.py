@@ -20,7 +20,7 @@ import json
 import struct
 import sys
 
-VERSION = 7
+VERSION = 8
 
 VERDICTS = [
     "Measured", "Keyframe", "First", "TooFewBeams", "TooFewLines", "TooFewCorrespondences", "Degenerate", "NotConverged",
@@ -55,6 +55,7 @@ MESSAGES = [
     ("Quality", {"sequence": "u16", "verdict": VERDICTS, "found": ("result", _FOUND, ("array", 2, "f32"))}),
     ("Wheels", {"time_us": "u32", "pose": ("array", 3, "f32")}),
     ("Gyro", {"time_us": "u32", "rate": "f32"}),
+    ("Zero", {"time_us": "u32", "zero_cdeg": "u16"}),
 ]
 
 

@@ -172,7 +172,7 @@ impl<W: Write> Watch<W> {
                 self.truth
                     .push([truth.pose[0].into(), truth.pose[1].into()]);
             }
-            Telemetry::Raw(_) | Telemetry::Wheels(_) | Telemetry::Gyro(_) => {
+            Telemetry::Raw(_) | Telemetry::Wheels(_) | Telemetry::Gyro(_) | Telemetry::Zero(_) => {
                 if let Some((time_us, content)) = telemetry::content(&message) {
                     if let Content::Bytes(bytes) = content {
                         self.recorded += bytes.len();

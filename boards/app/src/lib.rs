@@ -206,9 +206,18 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
         self.report.set_time(now_us);
     }
 
-    /// Takes the angle (0.01°) that looks forward by the lidar's own calibration, in place of its model's.
-    pub fn set_zero(&mut self, zero_cdeg: u16) {
-        self.pipeline.lidar_mut().set_zero(zero_cdeg);
+    /// Takes the angle (0.01°) that looks forward by the lidar's own calibration, in place of its model's: gives what to send, for a
+    /// recording must know it. The same again changes nothing.
+    pub fn set_zero(&mut self, zero_cdeg: u16) -> &[u8] {
+        self.report.out.clear();
+        if self.report.zero_cdeg != Some(zero_cdeg) {
+            // What came before was seen without it.
+            self.end_piece();
+            self.pipeline.lidar_mut().set_zero(zero_cdeg);
+            self.report.zero_cdeg = Some(zero_cdeg);
+            self.report.send_zero();
+        }
+        &self.report.out
     }
 
     /// What is due by the clock alone, lidar or not: gives what to send, most often nothing. To be called about every
@@ -365,7 +374,10 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
                 quality,
             }) => {
                 self.end_piece();
-                self.report.record = raw;
+                let was_recorded = core::mem::replace(&mut self.report.record, raw);
+                if !was_recorded {
+                    self.report.send_zero();
+                }
                 self.report.scans = scans;
                 self.report.quality = quality;
             }

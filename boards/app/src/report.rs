@@ -20,7 +20,7 @@ use crate::{
     AppConfig, Output, link,
     supervisor::Care,
     task::{Task, Told},
-    telemetry::{self, Gyro, Mounted, PIECE, Piece, Raw, Telemetry, Wheels},
+    telemetry::{self, Gyro, Mounted, PIECE, Piece, Raw, Telemetry, Wheels, Zero},
 };
 
 /// Revolutions between two health messages.
@@ -59,6 +59,8 @@ pub(crate) struct Report {
     pub mount: Mounted,
     /// Its model.
     pub lidar: Option<&'static Model>,
+    /// The angle of its own zero (0.01°), where it told one.
+    pub zero_cdeg: Option<u16>,
     /// Questions answered since the last revolution or tick.
     answers: u8,
     /// Revolutions in a row with too few beams to be matched.
@@ -116,6 +118,7 @@ impl Report {
             health_due: false,
             mount: Mounted::of(&config.odometry.points.mount),
             lidar: Some(config.lidar),
+            zero_cdeg: None,
             answers: 0,
             blind_turns: 0,
             #[cfg(feature = "mavlink")]
@@ -209,6 +212,15 @@ impl Report {
         if self.record {
             let time_us = self.now_us;
             self.send(&Telemetry::Gyro(Gyro { time_us, rate }));
+        }
+    }
+
+    /// Sends the angle of the lidar's own zero, where it told one and a recording wants it.
+    #[inline(never)]
+    pub fn send_zero(&mut self) {
+        if let (true, Some(zero_cdeg)) = (self.record, self.zero_cdeg) {
+            let time_us = self.now_us;
+            self.send(&Telemetry::Zero(Zero { time_us, zero_cdeg }));
         }
     }
 

@@ -131,7 +131,10 @@ fn go_round<
         if H::ASKS
             && let Some(zero_cdeg) = starter.zero_cdeg()
         {
-            app.set_zero(zero_cdeg);
+            let due = app.set_zero(zero_cdeg);
+            if !due.is_empty() {
+                hardware.send(due);
+            }
         }
     }
     // A piece of each in turn, the lidar's first: a flood of commands takes no more than its share of the time.

@@ -55,7 +55,8 @@ pub fn append<const N: usize>(message: &Telemetry, out: &mut Vec<u8, N>) {
         | Telemetry::Raw(_)
         | Telemetry::Scan(_)
         | Telemetry::Wheels(_)
-        | Telemetry::Gyro(_) => {
+        | Telemetry::Gyro(_)
+        | Telemetry::Zero(_) => {
             return;
         }
     };

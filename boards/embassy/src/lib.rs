@@ -14,6 +14,28 @@ use embassy_time::{Duration, Instant, with_timeout};
 use embedded_hal::pwm::SetDutyCycle;
 use embedded_io_async::{Read, Write};
 
+/// What the lines' buffers take, in a static of the board.
+pub struct Buffers {
+    /// What arrives while a match is computed: 178 ms of an LD06.
+    pub lidar: [u8; 4096],
+    /// Requests to it.
+    pub to_lidar: [u8; 32],
+    /// What comes in on the command line.
+    pub commands: [u8; 1024],
+    /// What is to leave on the telemetry line.
+    pub telemetry: [u8; 256],
+}
+
+impl Buffers {
+    /// Nothing in them.
+    pub const EMPTY: Self = Self {
+        lidar: [0; 4096],
+        to_lidar: [0; 32],
+        commands: [0; 1024],
+        telemetry: [0; 256],
+    };
+}
+
 /// The lines of a board.
 pub struct Lines<L, C, T> {
     /// From and to the lidar; buffered, for bytes arrive while a match is computed.
@@ -74,7 +96,10 @@ pub async fn run<M: Lidar, E: Task<N>, const N: usize, L: Read + Write>(
             if M::ASKS
                 && let Some(zero_cdeg) = starter.zero_cdeg()
             {
-                app.set_zero(zero_cdeg);
+                let due = app.set_zero(zero_cdeg);
+                if !due.is_empty() {
+                    let _ = lines.telemetry.write_all(due).await;
+                }
             }
         }
         #[cfg(feature = "demo")]

@@ -14,4 +14,4 @@ pub mod link;
 pub mod telemetry;
 
 /// Version of [`telemetry`] and [`command`]: changes whenever one of their messages does.
-pub const VERSION: u8 = 7;
+pub const VERSION: u8 = 8;

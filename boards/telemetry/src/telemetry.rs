@@ -45,6 +45,8 @@ pub enum Telemetry {
     Wheels(Wheels),
     /// A rate of the gyroscope as it came in, where a recording is asked for.
     Gyro(Gyro),
+    /// The angle of the lidar's own zero, where it told one and a recording is asked for.
+    Zero(Zero),
 }
 
 /// The firmware listens.
@@ -402,6 +404,15 @@ pub struct Gyro {
     pub time_us: u32,
     /// Counter-clockwise (rad/s).
     pub rate: f32,
+}
+
+/// The angle that looks forward by the lidar's own calibration: what comes from the lidar later is seen through it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Zero {
+    /// When it is told (µs, the board's clock, wrapping).
+    pub time_us: u32,
+    /// In place of its model's (0.01°).
+    pub zero_cdeg: u16,
 }
 
 /// Beams of a packet, in equal steps, as the lidar sees them.

@@ -11,9 +11,12 @@ use std::{
     rc::Rc,
 };
 
-use beamfix::lidar::{
-    Family, Model, Motor, Protocol, Start,
-    choice::{WithParser, with_parser},
+use beamfix::{
+    Odometry,
+    lidar::{
+        Family, Model, Motor, Protocol, Start,
+        choice::{WithParser, with_parser},
+    },
 };
 use beamfix_app::{
     AppConfig,
@@ -27,7 +30,12 @@ use beamfix_sim::{
     encoder::{self, Echo, Encoder},
 };
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
-use host_tests::board::commands::Commands;
+use host_tests::{
+    board::commands::Commands,
+    formats::{self, capture::log},
+    pipeline::follow,
+    watch::Watch,
+};
 
 /// Most beams of any model's revolution.
 const BEAMS: usize = 3400;
@@ -322,6 +330,9 @@ struct Found {
     states: Vec<LidarState>,
     unfed_us: u64,
     fed_us: u64,
+    /// All that the board has sent, and the bits of the poses in it.
+    sent: Vec<u8>,
+    poses: Vec<[u32; 3]>,
 }
 
 /// How the loop, which never ends, is left.
@@ -380,9 +391,11 @@ impl Hardware for Board {
 
     fn send(&mut self, bytes: &[u8]) {
         let mut found = self.found.borrow_mut();
+        found.sent.extend_from_slice(bytes);
         for &byte in bytes {
             match self.receiver.push(byte) {
                 Some(Telemetry::Pose(pose)) => {
+                    found.poses.push(pose.pose.map(f32::to_bits));
                     if matches!(pose.verdict, Verdict::Measured | Verdict::Keyframe) {
                         found.measured += 1;
                         if found.measured == 1 {
@@ -490,7 +503,7 @@ impl WithParser for Started {
 #[test]
 #[cfg_attr(debug_assertions, ignore = "twenty seconds of each of 46 lidars")]
 fn every_lidar_is_started_and_gives_poses_again_after_its_cable_was_out() {
-    let mut slowest = 0;
+    let (mut slowest, mut replayed) = (0, 0);
     for model in Model::ALL {
         let (duty, commands) = (Rc::new(Cell::new(0)), Rc::new(Ring::new()));
         let found = Rc::new(RefCell::new(Found::default()));
@@ -507,10 +520,14 @@ fn every_lidar_is_started_and_gives_poses_again_after_its_cable_was_out() {
             commands: commands.clone(),
             asked_us: 0,
         };
+        let config = AppConfig {
+            record: true,
+            ..AppConfig::for_model(model)
+        };
         with_parser(
             model,
             Started {
-                config: AppConfig::for_model(model),
+                config,
                 board,
                 pwm: Pwm(duty),
                 commands,
@@ -532,7 +549,43 @@ fn every_lidar_is_started_and_gives_poses_again_after_its_cable_was_out() {
             panic!("{}: {:?}", model.name, found.states)
         };
         assert!(found.states.contains(&LidarState::Silent));
+        if let Some(recorded) = recorded(model, &config, &found.sent) {
+            let differs = (recorded.iter().zip(&found.poses)).position(|(one, other)| one != other);
+            // The last piece of the bytes waits for more.
+            let missing = found.poses.len().wrapping_sub(recorded.len());
+            let name = model.name;
+            assert!(
+                missing <= 1 && differs.is_none(),
+                "{name}: {missing} poses are not in the recording, {differs:?} is another"
+            );
+            replayed += 1;
+        }
     }
-    println!("the slowest took {slowest} ms");
+    println!("the slowest took {slowest} ms; what `watch` recorded of {replayed} lidars replays");
+    assert!(replayed >= 36, "{replayed}");
     assert!(slowest < 5000, "the supervisor counts on less");
+}
+
+/// Bits of the poses that `replay` finds in what `watch` recorded of a board: with the zero that the lidar told the board. `None`
+/// where the revolutions are so fine that `replay` thins them.
+fn recorded(model: &Model, config: &AppConfig, sent: &[u8]) -> Option<Vec<[u32; 3]>> {
+    let mut file = Vec::new();
+    let mut watch = Watch::new(Some(&mut file), None).expect("memory");
+    watch.push(sent).expect("memory");
+    watch.finish().expect("memory");
+    drop(watch);
+    let content = formats::bytes::Content {
+        bytes: file,
+        cut: None,
+    };
+    let log = log::parse("recording", content, model.name).expect("the lidar's bytes");
+    log.capture.as_ref()?;
+    let mut poses = Vec::new();
+    let odometry = Odometry::<BEAMS>::new(config.odometry);
+    follow(&log, (usize::MAX, true), odometry, &mut |_, pose, _| {
+        poses.push([pose.x, pose.y, pose.theta].map(f32::to_bits));
+        Ok(())
+    })
+    .expect("nothing fails");
+    Some(poses)
 }

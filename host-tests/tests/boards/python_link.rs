@@ -11,7 +11,7 @@ use beamfix_app::{
     link,
     telemetry::{
         Cost, Found, Gyro, Health, LidarState, MotorState, Mounted, Piece, Pose, Quality, Raw,
-        Ready, Reset, Task, Telemetry, Truth, Verdict, Weak, Wheels,
+        Ready, Reset, Task, Telemetry, Truth, Verdict, Weak, Wheels, Zero,
     },
 };
 use serde_json::Value;
@@ -162,6 +162,10 @@ fn messages() -> Vec<Telemetry> {
     all.push(Telemetry::Gyro(Gyro {
         time_us: 1,
         rate: -THIRD,
+    }));
+    all.push(Telemetry::Zero(Zero {
+        time_us: u32::MAX,
+        zero_cdeg: 35_999,
     }));
     all
 }

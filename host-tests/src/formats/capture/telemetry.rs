@@ -56,6 +56,7 @@ pub fn content(message: &Telemetry) -> Option<(u32, Content<'_>)> {
             Some((wheels.time_us, Content::Wheels(Pose { x, y, theta })))
         }
         Telemetry::Gyro(gyro) => Some((gyro.time_us, Content::Gyro(gyro.rate))),
+        Telemetry::Zero(zero) => Some((zero.time_us, Content::Zero(zero.zero_cdeg))),
         _ => None,
     }
 }
