@@ -3,10 +3,7 @@
 #![no_std]
 #![no_main]
 
-use core::{
-    cell::RefCell,
-    sync::atomic::{AtomicU32, Ordering},
-};
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use beamfix_app::{
     AppConfig, Lidar as _, OdometryWith, Place, Row, SMALL_BEAMS, TELEMETRY_BAUD, chosen,
@@ -14,9 +11,9 @@ use beamfix_app::{
     run::{Hardware, TICK_US, run},
     telemetry::Reset,
 };
+use beamfix_stm32::{Line, divisor, send, send_all_out};
 use cortex_m::peripheral::{SCB, SYST, syst::SystClkSource};
 use cortex_m_rt::{entry, exception};
-use critical_section::Mutex;
 use stm32f1xx_hal::{
     pac::{self, interrupt},
     prelude::*,
@@ -26,8 +23,8 @@ use stm32f1xx_hal::{
     watchdog::IndependentWatchdog,
 };
 
-static LIDAR_UART: Mutex<RefCell<Option<Rx<pac::USART2>>>> = Mutex::new(RefCell::new(None));
-static COMMAND_UART: Mutex<RefCell<Option<Rx<pac::USART1>>>> = Mutex::new(RefCell::new(None));
+static LIDAR_UART: Line<Rx<pac::USART2>> = Line::new();
+static COMMAND_UART: Line<Rx<pac::USART1>> = Line::new();
 /// What arrives while a match is computed: 89 ms of an LD06.
 static LIDAR: Ring<2048> = Ring::new();
 static COMMANDS: Ring<128> = Ring::new();
@@ -74,25 +71,20 @@ impl Hardware for Board {
     }
 
     fn send(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            let _ = nb::block!(self.telemetry.write_u8(byte));
-        }
+        send(&mut self.telemetry, bytes);
     }
 
     fn send_to_lidar(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            let _ = nb::block!(self.to_lidar.write_u8(byte));
-        }
-        let _ = nb::block!(self.to_lidar.flush());
+        send_all_out(&mut self.to_lidar, bytes);
     }
 
     fn set_lidar_baud(&mut self, baud: u32) {
-        let divisor = (self.lidar_clock + baud / 2) / baud;
+        let divisor = divisor(self.lidar_clock, baud);
         // SAFETY: nothing else writes this register after the start.
         unsafe {
             (*pac::USART2::ptr())
                 .brr()
-                .write(|w| w.bits(divisor as u16))
+                .write(|w| w.bits(divisor))
         };
     }
 
@@ -139,10 +131,8 @@ fn main() -> ! {
     let (telemetry, mut commands) = uart.split();
     lidar.listen();
     commands.listen();
-    critical_section::with(|cs| {
-        LIDAR_UART.borrow(cs).replace(Some(lidar));
-        COMMAND_UART.borrow(cs).replace(Some(commands));
-    });
+    LIDAR_UART.set(lidar);
+    COMMAND_UART.set(commands);
     // SAFETY: nothing relies on these being masked.
     unsafe {
         cortex_m::peripheral::NVIC::unmask(pac::Interrupt::USART1);
@@ -193,30 +183,12 @@ fn SysTick() {
 
 #[interrupt]
 fn USART2() {
-    drain(&LIDAR_UART, &LIDAR);
+    LIDAR_UART.drain(&LIDAR);
 }
 
 #[interrupt]
 fn USART1() {
-    drain(&COMMAND_UART, &COMMANDS);
-}
-
-/// Moves what the UART holds to the ring.
-fn drain<U: serial::Instance, const B: usize>(
-    uart: &Mutex<RefCell<Option<Rx<U>>>>,
-    ring: &Ring<B>,
-) {
-    critical_section::with(|cs| {
-        let mut uart = uart.borrow_ref_mut(cs);
-        let Some(uart) = uart.as_mut() else { return };
-        loop {
-            match uart.read() {
-                Ok(byte) => ring.push(byte),
-                Err(nb::Error::Other(_)) => ring.lose(1),
-                Err(nb::Error::WouldBlock) => return,
-            }
-        }
-    });
+    COMMAND_UART.drain(&COMMANDS);
 }
 
 /// Nobody reads a message here: the board starts anew.

@@ -6,7 +6,7 @@
 use core::convert::Infallible;
 
 use beamfix_app::{AppConfig, Lidar as _, OdometryWith, Place, Row, chosen, telemetry::Reset};
-use beamfix_embassy::{Lines, run};
+use beamfix_embassy::{Buffers, Lines, run};
 use defmt_rtt as _;
 use embassy_executor::Spawner;
 use embassy_nrf::{
@@ -43,12 +43,7 @@ const HERE: AppConfig = Lidar::CONFIG
     .checked();
 
 static APP: ConstStaticCell<Place<Robot>> = ConstStaticCell::new(Place::EMPTY);
-/// What arrives while a match is computed: 178 ms of an LD06.
-static LIDAR: ConstStaticCell<[u8; 4096]> = ConstStaticCell::new([0; 4096]);
-/// Requests to it.
-static TO_LIDAR: ConstStaticCell<[u8; 32]> = ConstStaticCell::new([0; 32]);
-static COMMANDS: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
-static TELEMETRY: ConstStaticCell<[u8; 256]> = ConstStaticCell::new([0; 256]);
+static BUFFERS: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::EMPTY);
 
 /// The first channel, as embedded-hal has it.
 struct Motor<'d>(SimplePwm<'d>);
@@ -71,6 +66,7 @@ impl SetDutyCycle for Motor<'_> {
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let p = embassy_nrf::init(Default::default());
+    let buffers = BUFFERS.take();
     let uart = |baudrate| {
         let mut config = Config::default();
         config.baudrate = baudrate;
@@ -86,8 +82,8 @@ async fn main(_spawner: Spawner) {
         p.P1_02,
         Interrupts,
         uart(baudrate(Lidar::MODEL.baud)),
-        LIDAR.take(),
-        TO_LIDAR.take(),
+        &mut buffers.lidar,
+        &mut buffers.to_lidar,
     );
     let (commands, telemetry) = BufferedUarte::new(
         p.UARTE1,
@@ -99,8 +95,8 @@ async fn main(_spawner: Spawner) {
         p.P0_06,
         Interrupts,
         uart(Baudrate::Baud921600),
-        COMMANDS.take(),
-        TELEMETRY.take(),
+        &mut buffers.commands,
+        &mut buffers.telemetry,
     )
     .split();
     let mut config = SimpleConfig::default();

@@ -3,8 +3,6 @@
 #![no_std]
 #![no_main]
 
-use core::cell::RefCell;
-
 use beamfix::geometry::Pose;
 use beamfix_app::{
     AppConfig, Lidar as _, OdometryWith, Place, Row, TELEMETRY_BAUD, chosen,
@@ -12,11 +10,9 @@ use beamfix_app::{
     run::{Hardware, TICK_US, run},
     telemetry::Reset,
 };
+use beamfix_stm32::{Line, divisor, send, send_all_out};
 use cortex_m_rt::{entry, exception};
-use critical_section::Mutex;
 use defmt_rtt as _;
-use embedded_hal_nb::{nb, serial::Read};
-use embedded_io::Write as _;
 use panic_probe as _;
 use stm32f4xx_hal::{
     pac::{self, interrupt},
@@ -27,8 +23,8 @@ use stm32f4xx_hal::{
     watchdog::IndependentWatchdog,
 };
 
-static LIDAR_UART: Mutex<RefCell<Option<Rx<pac::USART1>>>> = Mutex::new(RefCell::new(None));
-static COMMAND_UART: Mutex<RefCell<Option<Rx<pac::USART2>>>> = Mutex::new(RefCell::new(None));
+static LIDAR_UART: Line<Rx<pac::USART1>> = Line::new();
+static COMMAND_UART: Line<Rx<pac::USART2>> = Line::new();
 /// What arrives while a match is computed: 178 ms of an LD06.
 static LIDAR: Ring<4096> = Ring::new();
 static COMMANDS: Ring<1024> = Ring::new();
@@ -60,22 +56,20 @@ impl Hardware for Board {
     }
 
     fn send(&mut self, bytes: &[u8]) {
-        let _ = self.telemetry.write_all(bytes);
+        send(&mut self.telemetry, bytes);
     }
 
     fn send_to_lidar(&mut self, bytes: &[u8]) {
-        let _ = self.to_lidar.write_all(bytes);
-        let _ = embedded_io::Write::flush(&mut self.to_lidar);
+        send_all_out(&mut self.to_lidar, bytes);
     }
 
     fn set_lidar_baud(&mut self, baud: u32) {
-        // As the HAL reckons it where the clock is at least 16 times as fast.
-        let divisor = (self.lidar_clock + baud / 2) / baud;
+        let divisor = divisor(self.lidar_clock, baud);
         // SAFETY: nothing else writes this register after the start.
         unsafe {
             (*pac::USART1::ptr())
                 .brr()
-                .write(|w| w.bits(divisor as u16))
+                .write(|w| w.bits(divisor))
         };
     }
 
@@ -126,10 +120,8 @@ fn main() -> ! {
         .split();
     lidar.listen();
     commands.listen();
-    critical_section::with(|cs| {
-        LIDAR_UART.borrow(cs).replace(Some(lidar));
-        COMMAND_UART.borrow(cs).replace(Some(commands));
-    });
+    LIDAR_UART.set(lidar);
+    COMMAND_UART.set(commands);
     // SAFETY: nothing relies on these being masked.
     unsafe {
         cortex_m::peripheral::NVIC::unmask(pac::Interrupt::USART1);
@@ -189,29 +181,10 @@ fn SysTick() {}
 
 #[interrupt]
 fn USART1() {
-    critical_section::with(|cs| {
-        if let Some(uart) = LIDAR_UART.borrow_ref_mut(cs).as_mut() {
-            drain(uart, &LIDAR);
-        }
-    });
+    LIDAR_UART.drain(&LIDAR);
 }
 
 #[interrupt]
 fn USART2() {
-    critical_section::with(|cs| {
-        if let Some(uart) = COMMAND_UART.borrow_ref_mut(cs).as_mut() {
-            drain(uart, &COMMANDS);
-        }
-    });
-}
-
-/// Moves what the UART holds to the ring.
-fn drain<const B: usize>(uart: &mut impl Read<u8>, ring: &Ring<B>) {
-    loop {
-        match uart.read() {
-            Ok(byte) => ring.push(byte),
-            Err(nb::Error::Other(_)) => ring.lose(1),
-            Err(nb::Error::WouldBlock) => return,
-        }
-    }
+    COMMAND_UART.drain(&COMMANDS);
 }

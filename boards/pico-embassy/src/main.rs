@@ -6,7 +6,7 @@
 use beamfix_app::{
     AppConfig, Lidar as _, OdometryWith, Place, Row, TELEMETRY_BAUD, chosen, telemetry::Reset,
 };
-use beamfix_embassy::{Lines, run};
+use beamfix_embassy::{Buffers, Lines, run};
 use defmt_rtt as _;
 use embassy_executor::Spawner;
 use embassy_rp::{
@@ -42,35 +42,34 @@ const HERE: AppConfig = Lidar::CONFIG
     .checked();
 
 static APP: ConstStaticCell<Place<Robot>> = ConstStaticCell::new(Place::EMPTY);
-/// What arrives while a match is computed: 178 ms of an LD06.
-static LIDAR: ConstStaticCell<[u8; 4096]> = ConstStaticCell::new([0; 4096]);
-/// Requests to it.
-static TO_LIDAR: ConstStaticCell<[u8; 32]> = ConstStaticCell::new([0; 32]);
-static COMMANDS: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
-static TELEMETRY: ConstStaticCell<[u8; 256]> = ConstStaticCell::new([0; 256]);
+static BUFFERS: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::EMPTY);
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let p = embassy_rp::init(Default::default());
+    let buffers = BUFFERS.take();
     let uart = |baud| {
         let mut config = Config::default();
         config.baudrate = baud;
         config
     };
-    let config = uart(Lidar::MODEL.baud);
     let lidar = BufferedUart::new(
         p.UART1,
         p.PIN_4,
         p.PIN_5,
         Interrupts,
-        TO_LIDAR.take(),
-        LIDAR.take(),
-        config,
+        &mut buffers.to_lidar,
+        &mut buffers.lidar,
+        uart(Lidar::MODEL.baud),
     );
-    let (pins, buffers) = ((p.PIN_0, p.PIN_1), (TELEMETRY.take(), COMMANDS.take()));
-    let config = uart(TELEMETRY_BAUD);
     let (telemetry, commands) = BufferedUart::new(
-        p.UART0, pins.0, pins.1, Interrupts, buffers.0, buffers.1, config,
+        p.UART0,
+        p.PIN_0,
+        p.PIN_1,
+        Interrupts,
+        &mut buffers.telemetry,
+        &mut buffers.commands,
+        uart(TELEMETRY_BAUD),
     )
     .split();
     let mut config = pwm::Config::default();
