@@ -10,6 +10,7 @@ pub mod bytes;
 pub mod demo;
 pub mod drivers;
 pub mod fields;
+pub mod localize;
 pub mod mapping;
 pub mod maps;
 mod panic;

@@ -73,7 +73,7 @@ impl Firmware {
             false => "",
         };
         let options = ["--features", self.feature, "--features", proof];
-        let built = self.compile(program, &options, &target_dir, "0")?;
+        let built = self.compile(program, &options, &target_dir, "0", None)?;
         let folder =
             target_dir
                 .join("elf")
@@ -91,7 +91,13 @@ impl Firmware {
 
     /// Builds one of its programs with a line table; gives the ELF file.
     pub fn build_with_lines(&self, program: &str) -> Result<PathBuf> {
-        self.compile(program, &[], &root().join("target/profile"), "1")
+        self.compile(program, &[], &root().join("target/profile"), "1", None)
+    }
+
+    /// Builds its program `localize` with a table in its flash; gives the ELF file, in a folder of its own.
+    pub fn build_in_map(&self, table: &Path) -> Result<PathBuf> {
+        let folder = root().join("target/localize");
+        self.compile("localize", &[], &folder, "0", Some(table))
     }
 
     /// Builds one of its programs into a folder, with so much for a debugger; gives the ELF file.
@@ -101,6 +107,7 @@ impl Firmware {
         options: &[&str],
         target_dir: &Path,
         debug: &str,
+        table: Option<&Path>,
     ) -> Result<PathBuf> {
         let folder = root().join("boards").join(self.package);
         let size = ["--config", "profile.release.opt-level=\"z\""];
@@ -109,6 +116,7 @@ impl Firmware {
             .args(options)
             .args(if self.is_small { &size[..] } else { &[] })
             .env("CARGO_PROFILE_RELEASE_DEBUG", debug)
+            .envs(table.map(|table| ("BEAMFIX_FIELD", table)))
             .arg("--target-dir")
             .arg(target_dir)
             .current_dir(&folder)

@@ -9,18 +9,27 @@ use beamfix::{
     sensor_model::likelihood_field::{FieldModel, LikelihoodField, Profile, stored},
 };
 use beamfix_app::{
-    AppConfig, Firmware,
+    BEAMS, Lidar as _, Row,
     link::Receiver,
-    map::{self, InMap},
+    map::{self, LocalizationWith},
     telemetry::{self, Reset, Telemetry},
 };
 use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::ld06::Sensor;
-use host_tests::{formats::ros_map, report::hash::PoseHash};
+use host_tests::{
+    board::{
+        Board,
+        emulator::{self, Count},
+    },
+    formats::ros_map,
+    report::hash::PoseHash,
+};
 
-/// Beams and points of the C library's localization, and the firmware's here.
-const BEAMS: usize = 1100;
+/// Beams and points of the C library's localization.
+const C_BEAMS: usize = 1100;
 const POINTS: usize = map::POINTS;
+/// Bytes that the firmware's program takes at a time: `boards/emulated/src/localize.rs`.
+const PIECE: usize = 32;
 
 /// A table of the simulated flat, and bytes of a lidar that is carried elsewhere after five seconds.
 pub fn scene() -> (Vec<u8>, Vec<u8>) {
@@ -60,8 +69,8 @@ pub fn expected(table: &[u8], bytes: &[u8]) -> String {
     let model = &Model::LDROBOT_LD06;
     let points = OdometryConfig::for_model(model).points;
     let localizer = Localizer::<POINTS>::new(pyramid, LocalizerConfig::DEFAULT);
-    let robot = MapLocalizer::<BEAMS, POINTS>::new(localizer, points);
-    let mut pipeline = Pipeline::<_, _, BEAMS>::new(parsers::Ldrobot::for_model(model), robot);
+    let robot = MapLocalizer::<C_BEAMS, POINTS>::new(localizer, points);
+    let mut pipeline = Pipeline::<_, _, C_BEAMS>::new(parsers::Ldrobot::for_model(model), robot);
     let (mut hash, mut poses, mut known) = (PoseHash::new(), 0u32, false);
     let mut rest = bytes;
     while !rest.is_empty() {
@@ -69,8 +78,8 @@ pub fn expected(table: &[u8], bytes: &[u8]) -> String {
         let mut stepped = false;
         let taken = pipeline.push_packet(rest, &mut |revolution: Revolution<
             '_,
-            MapLocalizer<'_, BEAMS, POINTS>,
-            BEAMS,
+            MapLocalizer<'_, C_BEAMS, POINTS>,
+            C_BEAMS,
         >| {
             stepped = true;
             known = matches!(revolution.step.outcome, Verdict::Tracking(..));
@@ -90,62 +99,86 @@ pub fn expected(table: &[u8], bytes: &[u8]) -> String {
     format!("{hash} {poses:08x} {lost:08x} 1\n")
 }
 
+/// What the firmware sends over these bytes.
+fn sent_over(table: Vec<u8>, bytes: &[u8]) -> Vec<u8> {
+    type Ld06 = Row<0>;
+    let shape = *stored::parse(&table).expect("a field").grid().shape();
+    let maxima = vec![0; Pyramid::bytes(&shape)].leak();
+    let mut app = Box::new(
+        LocalizationWith::<Ld06, BEAMS>::in_map(&Ld06::CONFIG, Ld06::PARSER, table.leak(), maxima)
+            .expect("a table and room for its maxima"),
+    );
+    let mut all = app.ready(Reset::Other).to_vec();
+    for mut rest in bytes.chunks(PIECE) {
+        while !rest.is_empty() {
+            let (taken, sent) = app.lidar(rest);
+            rest = &rest[taken..];
+            all.extend_from_slice(sent);
+            if !sent.is_empty() {
+                while !app.work(500_000) {}
+            }
+        }
+    }
+    all
+}
+
 /// The firmware's application over the same table and bytes: its telemetry holds the pipeline's poses, tells that they are
 /// searched for, and says which task it does.
 #[test]
 fn the_firmware_finds_its_pose_in_a_map_and_again_after_it_was_carried_away() {
     let (table, bytes) = scene();
     let wanted = expected(&table, &bytes);
-    let model = &Model::LDROBOT_LD06;
-    let shape = *stored::parse(&table).expect("a field").grid().shape();
-    let maxima = vec![0; Pyramid::bytes(&shape)].leak();
-    let config = AppConfig::for_model(model);
-    let config = AppConfig {
-        odometry: OdometryConfig::for_model(model),
-        ..config
-    };
-    let parser = parsers::Ldrobot::for_model(model);
-    let mut app = Firmware::<_, InMap<BEAMS>, BEAMS>::in_map(&config, parser, table.leak(), maxima)
-        .expect("a table and room for its maxima");
     let mut receiver = Receiver::new();
-    let mut read = |sent: &[u8]| {
-        let mut messages = Vec::new();
-        for &byte in sent {
-            match receiver.push::<Telemetry>(byte) {
-                Some(Telemetry::Ready(ready)) => {
-                    assert_eq!(ready.task, telemetry::Task::Localization);
-                }
-                Some(Telemetry::Pose(pose)) => messages.push(pose),
-                _ => {}
+    let (mut hash, mut poses, mut searched, mut task) = (PoseHash::new(), 0u32, 0, None);
+    for byte in sent_over(table, &bytes) {
+        let pose = match receiver.push::<Telemetry>(byte) {
+            Some(Telemetry::Ready(ready)) => {
+                task = Some(ready.task);
+                continue;
             }
-        }
-        messages
-    };
-    read(app.ready(Reset::Other));
-    let (mut hash, mut poses, mut searched) = (PoseHash::new(), 0u32, 0);
-    let mut rest = &bytes[..];
-    while !rest.is_empty() {
-        let (taken, sent) = app.lidar(rest);
-        let told = read(sent);
-        rest = &rest[taken..];
-        for told in &told {
-            let [x, y, theta] = told.pose;
-            match told.verdict {
-                telemetry::Verdict::Measured => {
-                    hash.push(Pose { x, y, theta });
-                    poses += 1;
-                }
-                telemetry::Verdict::Searching | telemetry::Verdict::Choosing => {
-                    assert_eq!(told.pose, [0.0; 3]);
-                    searched += 1;
-                }
-                _ => {}
+            Some(Telemetry::Pose(pose)) => pose,
+            _ => continue,
+        };
+        let [x, y, theta] = pose.pose;
+        match pose.verdict {
+            telemetry::Verdict::Measured => {
+                hash.push(Pose { x, y, theta });
+                poses += 1;
             }
+            telemetry::Verdict::Searching | telemetry::Verdict::Choosing => {
+                assert_eq!(pose.pose, [0.0; 3]);
+                searched += 1;
+            }
+            _ => {}
         }
-        while !told.is_empty() && !app.work(500_000) {}
     }
+    assert_eq!(task, Some(telemetry::Task::Localization));
     // Lost once.
     assert_eq!(format!("{hash} {poses:08x} 00000001 1\n"), wanted);
     // At the start, and after it was carried.
     assert!(searched >= 2, "{searched}");
+}
+
+/// The same firmware with the table in its flash, on two emulated boards: it sends what it sends here, byte for byte.
+#[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "once is enough: the firmware is always a release build"
+)]
+fn two_emulated_boards_send_the_same_with_the_map_in_their_flash() {
+    let (table, bytes) = scene();
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let field = folder.join("localize.field");
+    std::fs::write(&field, &table).expect("the table");
+    let here = sent_over(table, &bytes);
+    for name in ["m4f", "rv32"] {
+        let board = Board::named(name).expect("it is there");
+        let there = board
+            .firmware
+            .build_in_map(&field)
+            .and_then(|program| emulator::run(board, &program, &bytes, Count::None))
+            .unwrap_or_else(|error| panic!("{error:#}"));
+        println!("{name}: {} bytes", there.len());
+        assert!(here == there, "{name} sends something else");
+    }
 }
