@@ -81,6 +81,13 @@ impl<const N: usize, const K: usize, const E: usize, const L: usize, const B: us
         }
     }
 
+    /// Gives one that has seen nothing other settings of its odometry, in its place: nothing large is on the stack meanwhile.
+    #[cfg(feature = "internals")]
+    pub fn set_up(&mut self, odometry: OdometryConfig) {
+        self.robot_from_lidar = odometry.points.mount.robot_from_lidar;
+        self.odometry.restart(odometry);
+    }
+
     /// The map, for its keyframes and counters.
     #[must_use]
     pub const fn slam(&self) -> &Slam<K, E, L, B, V> {

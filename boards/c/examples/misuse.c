@@ -7,6 +7,7 @@
 
 static uint64_t storage[BEAMFIX_ODOMETRY_BYTES / 8 + 1];
 static uint64_t other[BEAMFIX_ODOMETRY_BYTES / 8 + 1];
+static uint64_t mapping[BEAMFIX_MAPPING_BYTES / 8];
 static uint64_t small[BEAMFIX_STARTUP_BYTES / 8];
 static int wrong;
 
@@ -30,6 +31,7 @@ int main(void) {
     beamfix_health health;
     beamfix_startup *startup = NULL;
     beamfix_action action;
+    beamfix_extent extent;
     const beamfix_lidar *lidar = &BEAMFIX_RPLIDAR_C1;
     uint8_t bytes[4] = {0}, done, field[64] = {0};
     unsigned points = 0;
@@ -77,6 +79,8 @@ int main(void) {
     expect("wheels", beamfix_push_wheels(robot, 0, NAN, 0, 0), BEAMFIX_STATUS_NOT_A_NUMBER);
     expect("gyro", beamfix_push_gyro(robot, 0, INFINITY), BEAMFIX_STATUS_NOT_A_NUMBER);
     expect("gyro", beamfix_push_gyro(robot, 0, 0.1f), BEAMFIX_STATUS_OK);
+    expect("no map to draw", beamfix_draw_map(robot, field, sizeof field, 8, 8, 0.1f, 0, 0), BEAMFIX_STATUS_OTHER_TASK);
+    expect("no map to measure", beamfix_get_extent(robot, 12, &extent), BEAMFIX_STATUS_OTHER_TASK);
     expect("a start without a map", beamfix_start_at(robot, 0, 0, 0), BEAMFIX_STATUS_OTHER_TASK);
     expect("work", beamfix_work(robot, 100, &done), BEAMFIX_STATUS_OK);
     expect("work", beamfix_work(robot, 100, NULL), BEAMFIX_STATUS_NULL_POINTER);
@@ -91,11 +95,34 @@ int main(void) {
     memset(storage, 0xa5, size);
     expect("overwritten", beamfix_push_wheels(robot, 0, 0, 0, 0), BEAMFIX_STATUS_NOT_MADE);
 
+    expect("short", beamfix_make_mapping(mapping, 100000, lidar, &config, &robot), BEAMFIX_STATUS_STORAGE_TOO_SMALL);
+    expect("mapping", beamfix_make_mapping(mapping, sizeof mapping, lidar, &config, &robot), BEAMFIX_STATUS_OK);
+    expect("no extent", beamfix_get_extent(robot, 12, NULL), BEAMFIX_STATUS_NULL_POINTER);
+    expect("not a range", beamfix_get_extent(robot, NAN, &extent), BEAMFIX_STATUS_NOT_A_NUMBER);
+    expect("nothing seen", beamfix_get_extent(robot, 12, &extent), BEAMFIX_STATUS_OK);
+    expect("no cells", beamfix_draw_map(robot, NULL, 64, 8, 8, 0.1f, 0, 0), BEAMFIX_STATUS_NULL_POINTER);
+    expect("few cells", beamfix_draw_map(robot, field, 63, 8, 8, 0.1f, 0, 0), BEAMFIX_STATUS_STORAGE_TOO_SMALL);
+    expect("no grid", beamfix_draw_map(robot, field, 64, 0, 8, 0.1f, 0, 0), BEAMFIX_STATUS_BAD_CONFIG);
+    expect("no size", beamfix_draw_map(robot, field, 64, 8, 8, INFINITY, 0, 0), BEAMFIX_STATUS_NOT_A_NUMBER);
+    expect("an empty map", beamfix_draw_map(robot, field, 64, 8, 8, 0.1f, 0, 0), BEAMFIX_STATUS_OK);
+    if (extent.min_x != 0 || extent.max_y != 0 || field[0] != BEAMFIX_CELL_UNKNOWN || field[63] != BEAMFIX_CELL_UNKNOWN) {
+        printf("an empty map has something in it\n");
+        wrong++;
+    }
+    expect("odometry again", beamfix_make_odometry(storage, size, lidar, &config, &robot), BEAMFIX_STATUS_OK);
+    memset(storage, 0xa5, size);
+
     expect("no start-up", beamfix_poll_startup((beamfix_startup *)other, 0, &action), BEAMFIX_STATUS_NOT_MADE);
     expect("short", beamfix_make_startup(small, 16, lidar, &startup), BEAMFIX_STATUS_STORAGE_TOO_SMALL);
     expect("misaligned", beamfix_make_startup((char *)small + 1, 399, lidar, &startup), BEAMFIX_STATUS_MISALIGNED);
     expect("made", beamfix_make_startup(small, sizeof small, lidar, &startup), BEAMFIX_STATUS_OK);
     expect("another object", beamfix_push_wheels((beamfix *)small, 0, 0, 0, 0), BEAMFIX_STATUS_NOT_MADE);
+    expect("a start-up for none", beamfix_use_startup(NULL, startup), BEAMFIX_STATUS_NULL_POINTER);
+    expect("a start-up for what was overwritten", beamfix_use_startup(robot, startup), BEAMFIX_STATUS_NOT_MADE);
+    expect("made again", beamfix_make_odometry(storage, size, lidar, &config, &robot), BEAMFIX_STATUS_OK);
+    expect("no start-up", beamfix_use_startup(robot, NULL), BEAMFIX_STATUS_NULL_POINTER);
+    expect("no start-up yet", beamfix_use_startup(robot, (beamfix_startup *)other), BEAMFIX_STATUS_NOT_MADE);
+    expect("nothing heard", beamfix_use_startup(robot, startup), BEAMFIX_STATUS_OK);
     expect("poll", beamfix_poll_startup(startup, 0, NULL), BEAMFIX_STATUS_NULL_POINTER);
     expect("poll", beamfix_poll_startup(startup, 0, &action), BEAMFIX_STATUS_OK);
     if (action.kind != BEAMFIX_ACTION_KIND_SEND || action.count != 2 || action.bytes[0] != 0xa5) {

@@ -52,9 +52,10 @@ int main(void) {
     }
     while ((count = platform_read(bytes, sizeof bytes)) > 0) {
         size_t at = 0;
+        uint32_t now_us = platform_now_us();
         while (at < count) {
             size_t taken;
-            beamfix_status status = beamfix_push_lidar(robot, platform_now_us(), bytes + at, count - at, &taken, &step);
+            beamfix_status status = beamfix_push_lidar(robot, now_us, bytes + at, count - at, &taken, &step);
             if (status < 0) {
                 platform_print("an error\n");
                 return 1;

@@ -30,8 +30,20 @@
      (((size_t)(width) + 15) / 16 + 1) * (((size_t)(height) + 15) / 16 + 1))
 
 
+// A budget for beamfix_work on mapping, between two revolutions: two million instructions.
+#define BEAMFIX_MAPPING_BUDGET 20000
+
+// A byte of a drawn map: nothing is there.
+#define BEAMFIX_CELL_FREE 2
+
+// A byte of a drawn map: not seen, or contradicted.
+#define BEAMFIX_CELL_UNKNOWN 128
+
+// A byte of a drawn map: something is there.
+#define BEAMFIX_CELL_OCCUPIED 254
+
 // Version of this interface: of the functions, types and constants of this header. It changes with each of them.
-#define BEAMFIX_VERSION 1
+#define BEAMFIX_VERSION 2
 
 // Alignment of the memory that every object is made in (bytes).
 #define BEAMFIX_ALIGN 8
@@ -57,6 +69,9 @@
 
 // The same with BEAMFIX_SMALL_BEAMS (bytes).
 #define BEAMFIX_SMALL_LOCALIZATION_BYTES 17600
+
+// Memory for mapping (bytes), with any lidar.
+#define BEAMFIX_MAPPING_BYTES 208000
 
 // Memory for a lidar's start-up (bytes).
 #define BEAMFIX_STARTUP_BYTES 400
@@ -88,7 +103,7 @@ enum beamfix_status
     BEAMFIX_STATUS_BAD_FIELD = -6,
     // A number is infinite or not a number.
     BEAMFIX_STATUS_NOT_A_NUMBER = -7,
-    // The object does another task: odometry has no map, and only localization is told where it starts.
+    // The object does another task: only mapping has a map to be drawn, and only localization is told where it starts.
     BEAMFIX_STATUS_OTHER_TASK = -8,
 };
 #ifndef __cplusplus
@@ -179,7 +194,7 @@ enum beamfix_action_kind
     BEAMFIX_ACTION_KIND_SET_BAUD = 2,
     // Switch the motor on, where the board does that.
     BEAMFIX_ACTION_KIND_MOTOR_ON = 3,
-    // Measurements come: give the bytes to beamfix_push_lidar from now on.
+    // Measurements come: call beamfix_use_startup once, and give the bytes to beamfix_push_lidar from now on.
     BEAMFIX_ACTION_KIND_READY = 4,
     // The lidar does not answer, or says that it is broken: start over after a while.
     BEAMFIX_ACTION_KIND_FAILED = 5,
@@ -217,6 +232,18 @@ typedef struct {
     float max_range;
 } beamfix_config;
 
+// What a map covers, in the frame in which the robot started.
+typedef struct {
+    // Smallest coordinate forward (m).
+    float min_x;
+    // Smallest coordinate to the left (m).
+    float min_y;
+    // Largest coordinate forward (m).
+    float max_x;
+    // Largest coordinate to the left (m).
+    float max_y;
+} beamfix_extent;
+
 // Where the robot is after a revolution of the lidar, and how well that is known.
 typedef struct {
     // Robot at the revolution's end: forward (m), in the frame in which it started, or in the map.
@@ -232,7 +259,7 @@ typedef struct {
     uint32_t time_us;
     // Counts revolutions from 0, wrapping.
     uint32_t sequence;
-    // Times that what scans are matched against was given up, wrapping: when it grows, the pose may have jumped.
+    // Times that what scans are matched against was given up, or a map's loop closed, wrapping: when it grows, the pose may have jumped.
     uint32_t lost;
     // How the pose was found.
     beamfix_verdict verdict;
@@ -429,6 +456,38 @@ uint32_t beamfix_lidar_baud(const beamfix_lidar *lidar);
 // Most beams of a revolution of the lidar; 0 for null.
 uint16_t beamfix_lidar_beams(const beamfix_lidar *lidar);
 
+// Makes mapping in `storage`: odometry, and a map of 224 keyframes whose loops are closed. A step's pose is in that map, in the frame
+// in which the robot started; it has no covariance.
+//
+// `storage`: BEAMFIX_MAPPING_BYTES bytes aligned to BEAMFIX_ALIGN. `config`: null for the lidar's defaults. Call beamfix_work between
+// the revolutions, with BEAMFIX_MAPPING_BUDGET. A program that names this function takes about as many bytes of flash more, for how the
+// memory begins.
+beamfix_status beamfix_make_mapping(void *storage,
+                                    size_t bytes,
+                                    const beamfix_lidar *lidar,
+                                    const beamfix_config *config,
+                                    beamfix **object);
+
+// Tells what the map covers, of all that was seen no farther than `max_range` (m) away. An object without a map, as odometry and
+// localization are, is refused; all zeros while there is nothing in it.
+beamfix_status beamfix_get_extent(beamfix *object,
+                                  float max_range,
+                                  beamfix_extent *extent);
+
+// Draws the map into `cells`, a byte each: BEAMFIX_CELL_FREE, BEAMFIX_CELL_OCCUPIED or BEAMFIX_CELL_UNKNOWN. What they held is lost.
+//
+// There are `width` times `height` cells of `cell` metres; the first lies at `min_x`, `min_y`, the next ones after it along x, and rows
+// along y. BEAMFIX_STATUS_BAD_CONFIG where such a grid cannot be, BEAMFIX_STATUS_STORAGE_TOO_SMALL where `bytes` are fewer than its
+// cells. Keyframes that lie outside are left out. It takes a while: some hundred thousand instructions for each keyframe.
+beamfix_status beamfix_draw_map(beamfix *object,
+                                uint8_t *cells,
+                                size_t bytes,
+                                uint16_t width,
+                                uint16_t height,
+                                float cell,
+                                float min_x,
+                                float min_y);
+
 // Fills in the settings for a lidar at the robot's centre, upright, looking forward, with that lidar's ranges.
 //
 // Null for either pointer gives an error.
@@ -476,7 +535,7 @@ beamfix_status beamfix_make_localization_small(void *storage,
 
 // Takes bytes of the lidar, in pieces of any size, until a revolution is complete or all are taken.
 //
-// `now_us`: when they came in (us, wrapping). `taken` receives how many were taken: give the rest again. BEAMFIX_STATUS_STEP says
+// `now_us`: when they came in (us, wrapping), for the rest of them the same again. `taken` receives how many were taken: give the rest again. BEAMFIX_STATUS_STEP says
 // that a revolution is complete and `step` was written; this call has then matched it, which takes 4 to 60 ms on a microcontroller:
 // a ring of 2 KB behind the UART keeps what comes meanwhile.
 beamfix_status beamfix_push_lidar(beamfix *object,
@@ -485,6 +544,13 @@ beamfix_status beamfix_push_lidar(beamfix *object,
                                   size_t count,
                                   size_t *taken,
                                   beamfix_step *step);
+
+// Takes over what a start-up heard of the lidar: the angle of its own zero, which some YDLIDAR keep, in place of its model's.
+//
+// Call it once when the start-up says that the lidar is ready, also for lidars that keep none: nothing changes then. Without it,
+// the poses of such a lidar are turned by that angle.
+beamfix_status beamfix_use_startup(beamfix *object,
+                                   const beamfix_startup *startup);
 
 // Takes the robot's pose by its wheels at a time (us, wrapping): forward and left (m) and heading (rad), in a frame of their own.
 //
@@ -500,10 +566,11 @@ beamfix_status beamfix_push_gyro(beamfix *object,
                                  uint32_t time_us,
                                  float rate);
 
-// Does a bounded part of localization's search for a lost pose: about `budget` bytes of the map looked up, 10 instructions each.
+// Does a bounded part of what is put off: of localization's search for a lost pose about `budget` bytes of the map looked up, 10
+// instructions each; of mapping about `budget` hundreds of instructions.
 //
 // Call it between the lidar's bytes. `done` receives 1 where nothing is left to do before the next revolution, as always in
-// odometry and while the pose is known; else 0.
+// odometry and while a pose in a known map is known; else 0.
 beamfix_status beamfix_work(beamfix *object,
                             uint32_t budget,
                             uint8_t *done);
@@ -530,7 +597,7 @@ beamfix_status beamfix_get_health(beamfix *object, beamfix_health *health);
 // Makes a lidar's start-up in `storage`: BEAMFIX_STARTUP_BYTES bytes aligned to BEAMFIX_ALIGN.
 //
 // Poll it with beamfix_poll_startup and give it what the lidar answers with beamfix_push_startup, until it says that the lidar is
-// ready; its memory is free then.
+// ready; give it to beamfix_use_startup then, and its memory is free.
 beamfix_status beamfix_make_startup(void *storage,
                                     size_t bytes,
                                     const beamfix_lidar *lidar,

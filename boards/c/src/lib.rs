@@ -1,6 +1,7 @@
 //! beamfix for C and C++.
 //!
 //! ```text
+//! map        mapping, and its map drawn
 //! lidars     one static a lidar: its model, and the functions of its protocol
 //! object     the caller's memory: a pipeline, and the odometry or the localization behind it
 //! place      large values made where they stay
@@ -15,6 +16,7 @@
 #![cfg_attr(not(fuzzing), no_std)]
 
 mod lidars;
+mod map;
 mod object;
 mod panic;
 mod place;
@@ -23,6 +25,7 @@ mod task;
 mod types;
 
 pub use lidars::*;
+pub use map::*;
 pub use object::*;
 pub use startup::*;
 pub use types::*;

@@ -12,7 +12,7 @@ use beamfix_core::{
 
 use crate::{
     object::{ForModel, Ops, needed},
-    place::Localization,
+    place::{Localization, Mapping},
     types::*,
 };
 
@@ -310,6 +310,7 @@ const _: () = {
     while k < ALL.len() {
         let Lidar { usual, small, .. } = ALL[k];
         assert!(needed(usual, size_of::<Odometry<BEAMFIX_BEAMS>>()) <= BEAMFIX_ODOMETRY_BYTES);
+        assert!(needed(usual, size_of::<Mapping>()) <= BEAMFIX_MAPPING_BYTES);
         assert!(
             needed(usual, size_of::<Localization<BEAMFIX_BEAMS>>()) <= BEAMFIX_LOCALIZATION_BYTES
         );

@@ -24,6 +24,7 @@ use beamfix_core::{
 use crate::{
     lidars::Lidar,
     place::{Localization, place_localization, place_odometry},
+    startup::{Starter, zero_cdeg},
     task::{Common, Known, Task, verdict},
     types::*,
 };
@@ -38,7 +39,9 @@ pub struct Object {
     magic: u32,
     calls: &'static Calls,
     pipeline: *mut u8,
-    task: *mut dyn Common,
+    pub(crate) task: *mut dyn Common,
+    /// When the bytes of the last call came in.
+    now_us: Option<u32>,
     sequence: u32,
     refused: u32,
 }
@@ -129,11 +132,12 @@ type Found = (Known, u32);
 
 /// The calls on a pipeline, whatever its parser and capacity.
 struct Calls {
-    push: unsafe fn(*mut u8, u32, &[u8], &mut Option<Found>) -> usize,
+    push: unsafe fn(*mut u8, Option<u32>, &[u8], &mut Option<Found>) -> usize,
     wheels: unsafe fn(*mut u8, u32, Pose),
     gyro: unsafe fn(*mut u8, u32, f32),
     health: unsafe fn(*const u8) -> Health,
     set_points: unsafe fn(*mut u8, PointCallback, *mut c_void),
+    set_zero: unsafe fn(*mut u8, u16),
 }
 
 impl<const N: usize> Ops<N> {
@@ -149,6 +153,7 @@ impl<const N: usize> Ops<N> {
                 gyro: gyro::<P, N>,
                 health: health::<P, N>,
                 set_points: set_points::<P, N>,
+                set_zero: set_zero::<P, N>,
             },
         }
     }
@@ -166,13 +171,15 @@ unsafe fn make_pipeline<P: ForModel, const N: usize>(place: *mut u8, model: &Mod
 /// `place` holds what [`make_pipeline`] of the same P and N made, and nobody else uses it now. So for all that follow.
 unsafe fn push<P: ForModel, const N: usize>(
     place: *mut u8,
-    now_us: u32,
+    now_us: Option<u32>,
     bytes: &[u8],
     found: &mut Option<Found>,
 ) -> usize {
     // SAFETY: the caller's promise.
     let pipeline = unsafe { &mut *place.cast::<Pipeline<P, Any<N>, N>>() };
-    pipeline.set_time(now_us);
+    if let Some(now_us) = now_us {
+        pipeline.set_time(now_us);
+    }
     let mut taken = 0;
     while let Some(rest) = bytes.get(taken..).filter(|rest| !rest.is_empty()) {
         taken += pipeline.push_packet(rest, &mut |revolution: Revolution<'_, Any<N>, N>| {
@@ -229,8 +236,16 @@ unsafe fn set_points<P: ForModel, const N: usize>(
     (points.callback, points.user) = (callback, user);
 }
 
+/// # Safety
+/// As [`push`].
+unsafe fn set_zero<P: ForModel, const N: usize>(place: *mut u8, zero_cdeg: u16) {
+    // SAFETY: the caller's promise.
+    let pipeline = unsafe { &mut *place.cast::<Pipeline<P, Any<N>, N>>() };
+    pipeline.lidar_mut().set_zero(zero_cdeg);
+}
+
 /// The caller's memory, from its start on.
-struct Storage {
+pub(crate) struct Storage {
     start: *mut u8,
     bytes: usize,
 }
@@ -238,7 +253,7 @@ struct Storage {
 impl Storage {
     /// # Errors
     /// Where it is null or misaligned.
-    fn new(start: *mut c_void, bytes: usize) -> Result<Self, Status> {
+    pub(crate) fn new(start: *mut c_void, bytes: usize) -> Result<Self, Status> {
         if start.is_null() {
             return Err(Status::NullPointer);
         }
@@ -264,7 +279,7 @@ pub(crate) const fn needed<const N: usize>(ops: &Ops<N>, task: usize) -> usize {
 ///
 /// # Safety
 /// `storage` is the caller's memory, for this object alone.
-unsafe fn make<const N: usize, T: Task<N> + 'static>(
+pub(crate) unsafe fn make<const N: usize, T: Task<N> + 'static>(
     storage: &Storage,
     lidar: &'static Lidar,
     ops: &'static Ops<N>,
@@ -306,6 +321,7 @@ unsafe fn make<const N: usize, T: Task<N> + 'static>(
             calls: &ops.calls,
             pipeline,
             task,
+            now_us: None,
             sequence: 0,
             refused: 0,
         });
@@ -348,7 +364,7 @@ unsafe fn make_odometry<const N: usize>(
 }
 
 /// The settings of the odometry, of which localization uses the points'.
-fn settings(config: Option<&Config>, model: &Model) -> Result<OdometryConfig, Status> {
+pub(crate) fn settings(config: Option<&Config>, model: &Model) -> Result<OdometryConfig, Status> {
     let preset = OdometryConfig::for_model(model);
     match config {
         None => Ok(preset),
@@ -424,7 +440,7 @@ pub(crate) unsafe fn slice<'a>(bytes: *const u8, count: usize) -> Result<&'a [u8
 ///
 /// # Safety
 /// Where not null and aligned, the memory can be read, and nobody else uses the object now.
-unsafe fn object<'a>(pointer: *mut Object) -> Result<&'a mut Object, Status> {
+pub(crate) unsafe fn object<'a>(pointer: *mut Object) -> Result<&'a mut Object, Status> {
     if pointer.is_null() {
         return Err(Status::NullPointer);
     }
@@ -564,7 +580,7 @@ pub unsafe extern "C" fn beamfix_make_localization_small(
 
 /// Takes bytes of the lidar, in pieces of any size, until a revolution is complete or all are taken.
 ///
-/// `now_us`: when they came in (us, wrapping). `taken` receives how many were taken: give the rest again. BEAMFIX_STATUS_STEP says
+/// `now_us`: when they came in (us, wrapping), for the rest of them the same again. `taken` receives how many were taken: give the rest again. BEAMFIX_STATUS_STEP says
 /// that a revolution is complete and `step` was written; this call has then matched it, which takes 4 to 60 ms on a microcontroller:
 /// a ring of 2 KB behind the UART keeps what comes meanwhile.
 #[unsafe(no_mangle)]
@@ -601,6 +617,8 @@ unsafe fn push_lidar(
     // SAFETY: the caller's promise.
     let (object, bytes) = unsafe { (self::object(pointer)?, slice(bytes, count)?) };
     let mut found = None;
+    // Once for bytes that came in together: a lidar without a clock would seem to have gone back.
+    let now_us = (object.now_us.replace(now_us) != Some(now_us)).then_some(now_us);
     // SAFETY: `make` put the pipeline there together with its calls.
     *taken = unsafe { (object.calls.push)(object.pipeline, now_us, bytes, &mut found) };
     let Some((known, time_us)) = found else {
@@ -627,6 +645,28 @@ unsafe fn push_lidar(
     };
     object.sequence = object.sequence.wrapping_add(1);
     Ok(true)
+}
+
+/// Takes over what a start-up heard of the lidar: the angle of its own zero, which some YDLIDAR keep, in place of its model's.
+///
+/// Call it once when the start-up says that the lidar is ready, also for lidars that keep none: nothing changes then. Without it,
+/// the poses of such a lidar are turned by that angle.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn beamfix_use_startup(
+    object: *mut Object,
+    startup: *const Starter,
+) -> Status {
+    // SAFETY: what the header asks of the caller.
+    let found = unsafe { (self::object(object), zero_cdeg(startup)) };
+    status(match found {
+        (Ok(object), Ok(Some(zero_cdeg))) => {
+            // SAFETY: `make` put the pipeline there together with its calls.
+            unsafe { (object.calls.set_zero)(object.pipeline, zero_cdeg) };
+            Ok(())
+        }
+        (Ok(_), Ok(None)) => Ok(()),
+        (Err(error), _) | (_, Err(error)) => Err(error),
+    })
 }
 
 /// Takes the robot's pose by its wheels at a time (us, wrapping): forward and left (m) and heading (rad), in a frame of their own.
@@ -666,10 +706,11 @@ pub unsafe extern "C" fn beamfix_push_gyro(object: *mut Object, time_us: u32, ra
     }))
 }
 
-/// Does a bounded part of localization's search for a lost pose: about `budget` bytes of the map looked up, 10 instructions each.
+/// Does a bounded part of what is put off: of localization's search for a lost pose about `budget` bytes of the map looked up, 10
+/// instructions each; of mapping about `budget` hundreds of instructions.
 ///
 /// Call it between the lidar's bytes. `done` receives 1 where nothing is left to do before the next revolution, as always in
-/// odometry and while the pose is known; else 0.
+/// odometry and while a pose in a known map is known; else 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn beamfix_work(object: *mut Object, budget: u32, done: *mut u8) -> Status {
     // SAFETY: what the header asks of the caller.

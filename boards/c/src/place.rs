@@ -9,13 +9,16 @@ use core::{arch::naked_asm, mem::size_of};
 
 use beamfix_core::{
     Localizer, LocalizerConfig, MapLocalizer, Odometry, OdometryConfig,
-    matching::correlative::Pyramid, scan::PointsConfig,
+    matching::correlative::Pyramid, pipeline::Mapper, scan::PointsConfig, slam::SlamConfig,
 };
 
-use crate::task::POINTS;
+use crate::{map::KEYFRAMES, task::POINTS, types::BEAMFIX_BEAMS};
 
 /// Localization as it lies in the caller's memory.
 pub(crate) type Localization<const N: usize> = MapLocalizer<'static, N, POINTS>;
+
+/// Mapping as it lies in the caller's memory: as `Mapper192k` has it, with revolutions of any lidar.
+pub(crate) type Mapping = Mapper<BEAMFIX_BEAMS, KEYFRAMES, 512, 880, 144, 360>;
 
 /// Goes on in another function with the same arguments.
 macro_rules! go_on_in {
@@ -52,6 +55,22 @@ pub(crate) unsafe extern "C" fn place_localization<const N: usize>(
     config: &PointsConfig,
 ) {
     go_on_in!(localization::<N>)
+}
+
+/// Mapping that has seen nothing, in flash: Rust would make two of them on the stack.
+static BEGINNING: Mapping = Mapping::new(OdometryConfig::DEFAULT, SlamConfig::DEFAULT);
+
+/// Writes mapping to its place.
+///
+/// # Safety
+/// As [`place_odometry`].
+pub(crate) unsafe fn place_mapping(place: *mut Mapping, config: &OdometryConfig) {
+    // SAFETY: the caller's promise; nothing in it points to itself, or must be dropped.
+    let mapping = unsafe {
+        place.copy_from_nonoverlapping(&BEGINNING, 1);
+        &mut *place
+    };
+    mapping.set_up(*config);
 }
 
 #[allow(improper_ctypes_definitions, reason = "only Rust looks into it")]

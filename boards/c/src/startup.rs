@@ -24,7 +24,7 @@ const _: () = assert!(align_of::<Starter>() <= BEAMFIX_ALIGN);
 /// Makes a lidar's start-up in `storage`: BEAMFIX_STARTUP_BYTES bytes aligned to BEAMFIX_ALIGN.
 ///
 /// Poll it with beamfix_poll_startup and give it what the lidar answers with beamfix_push_startup, until it says that the lidar is
-/// ready; its memory is free then.
+/// ready; give it to beamfix_use_startup then, and its memory is free.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn beamfix_make_startup(
     storage: *mut c_void,
@@ -109,6 +109,15 @@ pub unsafe extern "C" fn beamfix_push_startup(
         Ok(())
     });
     crate::object::status(taken)
+}
+
+/// The angle that looks forward by the lidar's own calibration (0.01°), where it told one.
+///
+/// # Safety
+/// As [`starter`].
+pub(crate) unsafe fn zero_cdeg(startup: *const Starter) -> Result<Option<u16>, Status> {
+    // SAFETY: the caller's promise; it is only read.
+    unsafe { starter(startup.cast_mut()) }.map(|starter| starter.startup.zero_cdeg())
 }
 
 /// # Safety

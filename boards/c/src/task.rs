@@ -8,8 +8,8 @@ use beamfix_core::{
 };
 
 use crate::{
-    place::Localization,
-    types::{Reason, Verdict},
+    place::{Localization, Mapping},
+    types::{BEAMFIX_BEAMS, Reason, Verdict},
 };
 
 /// Points of a scan that localization uses where all are not needed: as the firmware does.
@@ -41,6 +41,11 @@ pub(crate) trait Common {
 
     /// Times that the reference was given up.
     fn lost(&self) -> u32;
+
+    /// The map that is made, where one is.
+    fn map(&mut self) -> Option<&mut Mapping> {
+        None
+    }
 }
 
 impl<const N: usize> Task<N> for Odometry<N> {
@@ -100,6 +105,45 @@ impl<const N: usize> Common for Localization<N> {
 
     fn lost(&self) -> u32 {
         self.localizer().counters().lost
+    }
+}
+
+impl Task<BEAMFIX_BEAMS> for Mapping {
+    fn update(&mut self, scan: &Scan<BEAMFIX_BEAMS>, ego: EgoMotion) -> Known {
+        let step = Estimator::update(self, scan, ego);
+        Known {
+            pose: step.pose(),
+            covariance: step.covariance(),
+            verdict: step.verdict(),
+            reason: match &step.odometry.outcome {
+                _ if !step.is_located => Reason::Searching,
+                outcome => outcome.as_ref().err().map_or(Reason::None, why),
+            },
+            lost: self.lost(),
+        }
+    }
+}
+
+impl Common for Mapping {
+    fn work(&mut self, budget: u32) -> bool {
+        Estimator::work(self, budget)
+    }
+
+    fn start_at(&mut self, _: Pose) -> bool {
+        false
+    }
+
+    /// Maps begun anew, maps joined and loops closed: the pose jumps.
+    fn lost(&self) -> u32 {
+        let counters = self.slam().counters();
+        counters
+            .carried
+            .wrapping_add(counters.joined)
+            .wrapping_add(counters.loops)
+    }
+
+    fn map(&mut self) -> Option<&mut Mapping> {
+        Some(self)
     }
 }
 

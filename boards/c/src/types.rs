@@ -7,7 +7,7 @@ use core::ffi::c_void;
 use beamfix_core::{ConfigError, OdometryConfig, Pose};
 
 /// Version of this interface: of the functions, types and constants of this header. It changes with each of them.
-pub const BEAMFIX_VERSION: u32 = 1;
+pub const BEAMFIX_VERSION: u32 = 2;
 /// Alignment of the memory that every object is made in (bytes).
 pub const BEAMFIX_ALIGN: usize = 8;
 /// Most beams of a revolution; further ones are refused and counted.
@@ -25,6 +25,8 @@ pub const BEAMFIX_LDROBOT_SMALL_ODOMETRY_BYTES: usize = 12_120;
 pub const BEAMFIX_LOCALIZATION_BYTES: usize = 28_600;
 /// The same with BEAMFIX_SMALL_BEAMS (bytes).
 pub const BEAMFIX_SMALL_LOCALIZATION_BYTES: usize = 17_600;
+/// Memory for mapping (bytes), with any lidar.
+pub const BEAMFIX_MAPPING_BYTES: usize = 208_000;
 /// Memory for a lidar's start-up (bytes).
 pub const BEAMFIX_STARTUP_BYTES: usize = 400;
 /// Most bytes of a beamfix_action.
@@ -52,7 +54,7 @@ pub enum Status {
     BadField = -6,
     /// A number is infinite or not a number.
     NotANumber = -7,
-    /// The object does another task: odometry has no map, and only localization is told where it starts.
+    /// The object does another task: only mapping has a map to be drawn, and only localization is told where it starts.
     OtherTask = -8,
 }
 
@@ -139,7 +141,7 @@ pub struct Step {
     pub time_us: u32,
     /// Counts revolutions from 0, wrapping.
     pub sequence: u32,
-    /// Times that what scans are matched against was given up, wrapping: when it grows, the pose may have jumped.
+    /// Times that what scans are matched against was given up, or a map's loop closed, wrapping: when it grows, the pose may have jumped.
     pub lost: u32,
     /// How the pose was found.
     pub verdict: Verdict,
@@ -181,7 +183,7 @@ pub enum ActionKind {
     SetBaud = 2,
     /// Switch the motor on, where the board does that.
     MotorOn = 3,
-    /// Measurements come: give the bytes to beamfix_push_lidar from now on.
+    /// Measurements come: call beamfix_use_startup once, and give the bytes to beamfix_push_lidar from now on.
     Ready = 4,
     /// The lidar does not answer, or says that it is broken: start over after a while.
     Failed = 5,

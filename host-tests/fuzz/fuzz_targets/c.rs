@@ -32,6 +32,16 @@ enum Call {
         table: Vec<u8>,
         small: bool,
     },
+    Mapping {
+        missing: u8,
+    },
+    Extent(f32),
+    Draw {
+        bytes: u16,
+        side: [u16; 2],
+        cell: f32,
+        corner: [f32; 2],
+    },
     /// Without an object: null.
     Forget,
     Overwrite(u16, u8),
@@ -144,6 +154,30 @@ fuzz_target!(|input: Input| {
                 }
                 std::mem::forget(table);
             }
+            Call::Mapping { missing } => {
+                memory = Memory::new(BEAMFIX_MAPPING_BYTES - 1000 * usize::from(*missing), 0);
+                object = ptr::null_mut();
+                let (start, bytes) = (memory.start(), memory.bytes);
+                let status =
+                    unsafe { beamfix_make_mapping(start, bytes, lidar, ptr::null(), &mut object) };
+                assert_eq!(status == Status::Ok, !object.is_null());
+            }
+            Call::Extent(max_range) => {
+                let mut extent = Extent::default();
+                let _ = unsafe { beamfix_get_extent(object, *max_range, &mut extent) };
+                assert!(extent.min_x <= extent.max_x && extent.min_y <= extent.max_y);
+            }
+            Call::Draw {
+                bytes,
+                side: [width, height],
+                cell,
+                corner: [x, y],
+            } => {
+                let mut cells = vec![0; usize::from(*bytes)];
+                let (at, length) = (cells.as_mut_ptr(), cells.len());
+                let _ =
+                    unsafe { beamfix_draw_map(object, at, length, *width, *height, *cell, *x, *y) };
+            }
             Call::Forget => object = ptr::null_mut(),
             // What C may do by mistake; what was made there then is no object any more.
             Call::Overwrite(at, with) => {
@@ -225,6 +259,7 @@ fuzz_target!(|input: Input| {
                     }
                     let _ = unsafe { beamfix_push_startup(startup, bytes.as_ptr(), bytes.len()) };
                 }
+                let _ = unsafe { beamfix_use_startup(object, startup) };
             }
         }
     }

@@ -4,5 +4,6 @@ mod cross;
 mod header;
 mod host;
 mod localize;
+mod map;
 mod packages;
 mod tools;

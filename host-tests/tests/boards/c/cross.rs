@@ -13,6 +13,7 @@ use super::host::{capture, expected};
 use super::tools::{archive, folder, has, run, sources};
 
 /// A compiler and the machine that runs what it makes.
+#[derive(Clone, Copy)]
 pub struct Board {
     pub name: &'static str,
     target: &'static str,
@@ -63,6 +64,12 @@ pub const BOARDS: [Board; 4] = [
 ];
 
 impl Board {
+    /// The same with so much RAM (bytes).
+    pub fn with_ram(self, bytes: u32) -> Self {
+        let ram = (self.ram.0, bytes);
+        Self { ram, ..self }
+    }
+
     /// Compiles an example; `None` where a tool is missing.
     pub fn compile(&self, into: &Path, example: &[&Path]) -> Option<PathBuf> {
         self.compile_with(into, example, &[])

@@ -11,7 +11,7 @@ use beamfix::{
     lidar::{Model, parsers},
 };
 use beamfix_sim::drive::{Settings, drive};
-use beamfix_sim::encoder::ld06::Sensor;
+use beamfix_sim::encoder::{self, ld06::Sensor};
 use host_tests::report::hash::PoseHash;
 
 use super::tools::{archive, folder, has, run, sources};
@@ -120,4 +120,62 @@ fn the_example_finds_rusts_poses() {
     fs::write(&input, &bytes).expect("the capture");
     let input = File::open(input).expect("the capture");
     assert_eq!(output_of(&program, input.into()), expected(&bytes));
+}
+
+/// As the unit in `zero.c` tells it (0.01°): 37 quarters of a degree.
+const ZERO_CDEG: u16 = 925;
+
+/// Every pose of a YDLIDAR's bytes, its bits as text, by a parser for this model.
+fn poses(model: &Model, bytes: &[u8]) -> String {
+    const BEAMS: usize = 1100;
+    let odometry = Odometry::<BEAMS>::new(OdometryConfig::for_model(model));
+    let mut pipeline = Box::new(Pipeline::new(parsers::Ydlidar::for_model(model), odometry));
+    let mut text = String::new();
+    for (k, bytes) in bytes.chunks(256).enumerate() {
+        // As `zero.c` has it.
+        pipeline.set_time(15_677 * (k as u32 + 1));
+        pipeline.push(bytes, &mut |revolution: Revolution<
+            '_,
+            Odometry<BEAMS>,
+            BEAMS,
+        >| {
+            let pose = revolution.step.pose;
+            let [x, y, theta] = [pose.x, pose.y, pose.theta].map(f32::to_bits);
+            text += &format!("{x:08x} {y:08x} {theta:08x}\n");
+        });
+    }
+    text
+}
+
+#[test]
+fn the_zero_that_a_lidar_tells_at_its_start_turns_the_poses_as_in_rust() {
+    let Some(program) = compile("zero", &["zero.c"], &[]) else {
+        return;
+    };
+    let model = &Model::YDLIDAR_G2;
+    let turned = Model {
+        zero_cdeg: ZERO_CDEG,
+        ..*model
+    };
+    let settings = Settings {
+        seconds: 6.0,
+        ..Settings::DEFAULT
+    };
+    let bytes = drive(&settings, &mut *encoder::for_model(&turned)).bytes;
+    let input = program.with_file_name("input.bin");
+    fs::write(&input, &bytes).expect("the capture");
+    let said = |arguments: &[&str]| {
+        let output = Command::new(&program)
+            .args(arguments)
+            .stdin(File::open(&input).expect("the capture"))
+            .output()
+            .expect("it starts");
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let [with, without] = [poses(&turned, &bytes), poses(model, &bytes)];
+    let count = with.lines().count();
+    assert!(count > 35 && with != without, "{count} poses");
+    assert_eq!(said(&[]), with);
+    assert_eq!(said(&["without"]), without);
 }

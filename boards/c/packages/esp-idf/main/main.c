@@ -16,9 +16,10 @@ static void run(void *unused) {
     ESP_ERROR_CHECK(beamfix_make_odometry(storage, sizeof storage, &BEAMFIX_LDROBOT_LD06, NULL, &robot) == BEAMFIX_STATUS_OK ? ESP_OK : ESP_FAIL);
     for (;;) {
         int count = uart_read_bytes(UART_NUM_1, bytes, sizeof bytes, pdMS_TO_TICKS(10));
+        uint32_t now_us = (uint32_t)esp_timer_get_time();
         for (size_t at = 0; count > 0 && at < (size_t)count;) {
             size_t taken;
-            beamfix_status status = beamfix_push_lidar(robot, (uint32_t)esp_timer_get_time(), bytes + at, (size_t)count - at, &taken, &step);
+            beamfix_status status = beamfix_push_lidar(robot, now_us, bytes + at, (size_t)count - at, &taken, &step);
             at += taken;
             if (status == BEAMFIX_STATUS_STEP) {
                 printf("%.3f %.3f %.4f %s\n", step.x, step.y, step.theta,

@@ -19,10 +19,11 @@ void loop() {
     while (count < sizeof bytes && Serial1.available() > 0) {
         bytes[count++] = static_cast<uint8_t>(Serial1.read());
     }
+    uint32_t now_us = micros();
     for (size_t at = 0; at < count;) {
         size_t taken = 0;
         beamfix_step step;
-        beamfix_status status = beamfix_push_lidar(robot, micros(), bytes + at, count - at, &taken, &step);
+        beamfix_status status = beamfix_push_lidar(robot, now_us, bytes + at, count - at, &taken, &step);
         if (status < 0) {
             return;
         }
