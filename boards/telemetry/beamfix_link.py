@@ -267,6 +267,12 @@ def ask_ready():
     return frame(b"\7")
 
 
+def choose(name):
+    """The command that tells which lidar hangs on the board, for a board that has a choice; others leave it out."""
+    data = name.encode()
+    return frame(bytes([8]) + _varint(len(data)) + data)
+
+
 def main(arguments):
     as_json = "--json" in arguments
     names = [name for name in arguments if name != "--json"]

@@ -10,6 +10,8 @@
 //! task are types: [`lidars`], [`task`].
 #![no_std]
 
+#[cfg(feature = "any-lidar")]
+pub mod any;
 mod config;
 pub mod lidars;
 pub mod map;
@@ -106,20 +108,8 @@ impl<P: Protocol, const N: usize> Place<Firmware<P, Odometry<N>, N>> {
         config: &AppConfig,
     ) -> &mut Firmware<P, Odometry<N>, N> {
         let Self(app) = self;
-        let Firmware {
-            pipeline,
-            commands,
-            piece,
-            piece_bytes,
-            lidar_bytes,
-            report,
-        } = app;
-        pipeline.set_up(L::PARSER, config.odometry);
-        *commands = link::Receiver::new();
-        *piece = NO_PIECE;
-        *piece_bytes = 0;
-        *lidar_bytes = 0;
-        *report = Report::new(config);
+        app.commands = link::Receiver::new();
+        app.set_up(L::PARSER, config);
         app
     }
 }
@@ -146,6 +136,25 @@ impl<const N: usize> App<N> {
 }
 
 impl<P: Protocol, const N: usize> Firmware<P, Odometry<N>, N> {
+    /// Begins anew with these settings and their lidar's parser, in its place; a command that has begun goes on.
+    #[inline(always)]
+    fn set_up(&mut self, lidar: P, config: &AppConfig) {
+        // By name: a field more must be set here too.
+        let Self {
+            pipeline,
+            commands: _,
+            piece,
+            piece_bytes,
+            lidar_bytes,
+            report,
+        } = self;
+        pipeline.set_up(lidar, config.odometry);
+        *piece = NO_PIECE;
+        *piece_bytes = 0;
+        *lidar_bytes = 0;
+        *report = Report::new(config);
+    }
+
     /// Tells the pose since the start, by the lidar that `lidar` reads: the settings' one.
     #[must_use]
     pub const fn odometry(config: AppConfig, lidar: P) -> Self {
@@ -363,6 +372,15 @@ impl<P: Protocol, E: Task<N>, const N: usize> Firmware<P, E, N> {
                 if self.report.may_answer() {
                     self.send_ready(Reset::Asked);
                 }
+            }
+            Some(Command::Choose { lidar }) => {
+                #[cfg(feature = "any-lidar")]
+                {
+                    let named = self.report.lidars.and_then(|named| named(lidar));
+                    self.report.chosen = named.or(self.report.chosen);
+                }
+                #[cfg(not(feature = "any-lidar"))]
+                let _ = lidar;
             }
             Some(Command::StartAt { x, y, theta }) => {
                 let estimator = self.pipeline.tracker_mut().estimator_mut();

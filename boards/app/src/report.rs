@@ -61,6 +61,12 @@ pub(crate) struct Report {
     pub lidar: Option<&'static Model>,
     /// The angle of its own zero (0.01°), where it told one.
     pub zero_cdeg: Option<u16>,
+    /// Finds a lidar's model by its name, on a board that has a choice.
+    #[cfg(feature = "any-lidar")]
+    pub lidars: Option<fn(&str) -> Option<&'static Model>>,
+    /// Which one a command has chosen.
+    #[cfg(feature = "any-lidar")]
+    pub chosen: Option<&'static Model>,
     /// Questions answered since the last revolution or tick.
     answers: u8,
     /// Revolutions in a row with too few beams to be matched.
@@ -119,6 +125,10 @@ impl Report {
             mount: Mounted::of(&config.odometry.points.mount),
             lidar: Some(config.lidar),
             zero_cdeg: None,
+            #[cfg(feature = "any-lidar")]
+            lidars: None,
+            #[cfg(feature = "any-lidar")]
+            chosen: None,
             answers: 0,
             blind_turns: 0,
             #[cfg(feature = "mavlink")]

@@ -87,6 +87,47 @@ pub fn run<P: Protocol, E: Task<N>, const N: usize, const L: usize, const C: usi
     }
 }
 
+/// Runs the application for ever with whichever lidar a command chooses; with the settings' until then. How the lidar sits and how
+/// the motor's line is wired stays as the settings have it.
+#[cfg(feature = "any-lidar")]
+pub fn run_any<const N: usize, const L: usize, const C: usize>(
+    app: &mut crate::any::AnyLidar<N>,
+    config: &AppConfig,
+    rings: (&Ring<L>, &Ring<C>),
+    mut hardware: impl Hardware,
+    mut pwm: impl SetDutyCycle,
+) -> ! {
+    let mut config = *config;
+    let reset = hardware.reset();
+    hardware.send(app.ready(reset));
+    loop {
+        let mut supervisor = Supervisor::new(&mut pwm, &config, hardware.now_us());
+        let mut starter = Starter::new(config.lidar);
+        let chosen = loop {
+            go_round(app, rings, &mut hardware, &mut supervisor, &mut starter);
+            if let Some(chosen) = app.chosen() {
+                break chosen;
+            }
+        };
+        let mount = config.odometry.points.mount;
+        let motor = config.motor.is_some();
+        config = AppConfig {
+            lidar: chosen,
+            ..config
+        };
+        let other = AppConfig::for_model(chosen);
+        config.odometry = other.odometry;
+        config.odometry.points.mount = mount;
+        config.motor = other.motor.filter(|_| motor);
+        app.choose(&config);
+        hardware.set_lidar_baud(chosen.baud);
+        // What came at another speed.
+        let mut bytes = [0; PIECE];
+        while rings.0.read(&mut bytes) > 0 {}
+        hardware.send(app.ready(Reset::Asked));
+    }
+}
+
 /// Once through everything that can be due.
 #[inline(always)]
 fn go_round<

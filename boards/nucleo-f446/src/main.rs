@@ -5,9 +5,9 @@
 
 use beamfix::geometry::Pose;
 use beamfix_app::{
-    AppConfig, Lidar as _, OdometryWith, Place, Row, TELEMETRY_BAUD, chosen,
+    AppConfig, Lidar as _, Place, Row, TELEMETRY_BAUD, chosen,
     ring::Ring,
-    run::{Hardware, TICK_US, run},
+    run::{self, Hardware, TICK_US},
     telemetry::Reset,
 };
 use beamfix_stm32::{Line, divisor, send, send_all_out};
@@ -32,7 +32,10 @@ static COMMANDS: Ring<1024> = Ring::new();
 /// The lidar: a name of `beamfix lidars`; BEAMFIX_LIDAR=NAME builds for another.
 type Lidar = Row<{ chosen("ld06") }>;
 /// The task, and the most beams of a revolution.
-type Robot = OdometryWith<Lidar, { Lidar::BEAMS }>;
+#[cfg(not(feature = "any-lidar"))]
+type Robot = beamfix_app::OdometryWith<Lidar, { Lidar::BEAMS }>;
+#[cfg(feature = "any-lidar")]
+type Robot = beamfix_app::any::AnyLidar<1100>;
 
 struct Board {
     to_lidar: Tx<pac::USART1>,
@@ -45,7 +48,7 @@ struct Board {
 }
 
 impl Hardware for Board {
-    const ASKS: bool = Lidar::ASKS;
+    const ASKS: bool = Lidar::ASKS || cfg!(feature = "any-lidar");
 
     fn reset(&mut self) -> Reset {
         self.reset
@@ -66,11 +69,7 @@ impl Hardware for Board {
     fn set_lidar_baud(&mut self, baud: u32) {
         let divisor = divisor(self.lidar_clock, baud);
         // SAFETY: nothing else writes this register after the start.
-        unsafe {
-            (*pac::USART1::ptr())
-                .brr()
-                .write(|w| w.bits(divisor))
-        };
+        unsafe { (*pac::USART1::ptr()).brr().write(|w| w.bits(divisor)) };
     }
 
     fn feed_watchdog(&mut self) {
@@ -158,8 +157,11 @@ fn main() -> ! {
     };
     #[cfg(feature = "demo")]
     let board = beamfix_selftest::simulated::Simulated::new(board);
-    let app = APP.odometry::<Lidar>(&HERE);
-    run(app, &HERE, (&LIDAR, &COMMANDS), board, motor)
+    let rings = (&LIDAR, &COMMANDS);
+    #[cfg(feature = "any-lidar")]
+    run::run_any(APP.any(&HERE), &HERE, rings, board, motor);
+    #[cfg(not(feature = "any-lidar"))]
+    run::run(APP.odometry::<Lidar>(&HERE), &HERE, rings, board, motor)
 }
 
 /// Why the chip has started; forgets it, so that the next time tells itself.

@@ -57,6 +57,12 @@ pub enum Command<'a> {
     },
     /// Asks for [`Ready`](crate::telemetry::Ready), for who comes after the board's start.
     Ready,
+    /// Which lidar hangs on the board, for one that has a choice: it begins anew with it, and says so by
+    /// [`Ready`](crate::telemetry::Ready). Others leave it out.
+    Choose {
+        /// A name of the table of models.
+        lidar: &'a str,
+    },
 }
 
 /// A beam as it is sent: `u16` bearing, `u16` range (mm, 0 for none), `u32` time (µs), `u8` quality, little endian.

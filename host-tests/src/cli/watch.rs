@@ -9,6 +9,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+use beamfix::lidar::Model;
 use beamfix_app::command::Command;
 use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::ld06::Sensor;
@@ -46,6 +47,9 @@ pub struct Args {
     /// Ask the board how good each match was and write it here: a line of CSV for each.
     #[arg(long, value_name = "FILE")]
     quality: Option<PathBuf>,
+    /// Tell the board which lidar hangs on it, where its firmware has a choice (feature `any-lidar`): a name of `lidars`.
+    #[arg(long, value_name = "NAME")]
+    lidar: Option<String>,
     /// Print a line instead of drawing in the terminal.
     #[arg(long)]
     plain: bool,
@@ -85,6 +89,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Some(&args.out),
     ];
     output::spare(source.as_slice(), &written)?;
+    if let Some(lidar) = &args.lidar
+        && Model::named(lidar).is_none()
+    {
+        bail!("--lidar {lidar}: `lidars` lists the names");
+    }
     let recording = args.record.as_deref().map(output::create).transpose()?;
     let qualities = args.quality.as_deref().map(output::create).transpose()?;
     let mut live = Live {
@@ -168,6 +177,9 @@ impl Live<'_> {
     /// Asks whoever listens for beams, and for the lidar's bytes where they are recorded.
     fn ask(&self, commands: &mut impl Write) {
         let mut asked = Commands::new();
+        if let Some(lidar) = (self.args.lidar.as_deref()).filter(|_| self.watch.poses == 0) {
+            asked.send(&Command::Choose { lidar });
+        }
         asked.send(&Command::Send {
             raw: self.args.record.is_some(),
             scans: true,

@@ -20,9 +20,11 @@ use beamfix::{
 };
 use beamfix_app::{
     AppConfig,
+    any::{AnyLidar, AnyParser},
+    command::Command,
     link::Receiver,
     ring::Ring,
-    run::{Hardware, run},
+    run::{Hardware, run, run_any},
     telemetry::{LidarState, Telemetry, Verdict},
 };
 use beamfix_sim::{
@@ -474,6 +476,31 @@ struct Started {
     commands: Rc<Ring<64>>,
 }
 
+impl Started {
+    /// On a board that has a choice.
+    fn run_any(self) {
+        let mut app = Box::new(AnyLidar::<BEAMS>::odometry(
+            self.config,
+            AnyParser::for_model(self.config.lidar).expect("a family that is known"),
+        ));
+        app.choose(&self.config);
+        let lidar = Ring::<4096>::new();
+        let over = catch_unwind(AssertUnwindSafe(|| {
+            run_any(
+                &mut *app,
+                &self.config,
+                (&lidar, &*self.commands),
+                self.board,
+                self.pwm,
+            )
+        }));
+        let Err(over) = over;
+        if !over.is::<Over>() {
+            resume_unwind(over);
+        }
+    }
+}
+
 impl WithParser for Started {
     type Output = ();
 
@@ -500,60 +527,78 @@ impl WithParser for Started {
     }
 }
 
+/// A model's drive on a board that is built for it, or that a command tells which lidar it has.
+fn driven(model: &'static Model, config: &AppConfig, is_chosen: bool) -> Found {
+    let (duty, commands) = (Rc::new(Cell::new(0)), Rc::new(Ring::new()));
+    let found = Rc::new(RefCell::new(Found::default()));
+    let mut unit = Unit::new(model);
+    unit.has_power(0);
+    let board = Board {
+        us: 0,
+        unit,
+        stage: Stage::Begins,
+        baud: config.lidar.baud,
+        duty: duty.clone(),
+        receiver: Receiver::new(),
+        found: found.clone(),
+        commands: commands.clone(),
+        asked_us: 0,
+    };
+    let started = Started {
+        config: *config,
+        board,
+        pwm: Pwm(duty),
+        commands,
+    };
+    match is_chosen {
+        true => {
+            let mut choose = Commands::new();
+            choose.send(&Command::Choose { lidar: "no lidar" });
+            choose.send(&Command::Choose { lidar: model.name });
+            started.commands.extend(choose.bytes());
+            started.run_any();
+        }
+        false => with_parser(model, started),
+    }
+    found.take()
+}
+
+impl Found {
+    /// Started, poses where they should be before and after the cable was out, the watchdog fed.
+    fn expect_well(&self, name: &str) {
+        let (mm, degrees) = self.off;
+        println!(
+            "{name:<20} first pose after {:?} ms, {mm:.0} mm and {degrees:.2}° off, {:?}, fed every {} ms",
+            self.starts_ms,
+            self.states,
+            self.unfed_us / 1000
+        );
+        assert!(mm < 30.0 && degrees.abs() < 1.0, "{name}");
+        assert!(self.unfed_us < 100_000, "{name}");
+        let [.., LidarState::Turning] = self.states[..] else {
+            panic!("{name}: {:?}", self.states)
+        };
+        assert!(self.states.contains(&LidarState::Silent));
+    }
+}
+
 #[test]
 #[cfg_attr(debug_assertions, ignore = "twenty seconds of each of 46 lidars")]
 fn every_lidar_is_started_and_gives_poses_again_after_its_cable_was_out() {
     let (mut slowest, mut replayed) = (0, 0);
     for model in Model::ALL {
-        let (duty, commands) = (Rc::new(Cell::new(0)), Rc::new(Ring::new()));
-        let found = Rc::new(RefCell::new(Found::default()));
-        let mut unit = Unit::new(model);
-        unit.has_power(0);
-        let board = Board {
-            us: 0,
-            unit,
-            stage: Stage::Begins,
-            baud: model.baud,
-            duty: duty.clone(),
-            receiver: Receiver::new(),
-            found: found.clone(),
-            commands: commands.clone(),
-            asked_us: 0,
-        };
         let config = AppConfig {
             record: true,
             ..AppConfig::for_model(model)
         };
-        with_parser(
-            model,
-            Started {
-                config,
-                board,
-                pwm: Pwm(duty),
-                commands,
-            },
-        );
-        let found = found.borrow();
-        let (mm, degrees) = found.off;
-        println!(
-            "{:<20} first pose after {:?} ms, {mm:.0} mm and {degrees:.2}° off, {:?}, fed every {} ms",
-            model.name,
-            found.starts_ms,
-            found.states,
-            found.unfed_us / 1000
-        );
+        let found = driven(model, &config, false);
+        let name = model.name;
+        found.expect_well(name);
         slowest = slowest.max(found.starts_ms[0]);
-        assert!(mm < 30.0 && degrees.abs() < 1.0, "{}", model.name);
-        assert!(found.unfed_us < 100_000, "{}", model.name);
-        let [.., LidarState::Turning] = found.states[..] else {
-            panic!("{}: {:?}", model.name, found.states)
-        };
-        assert!(found.states.contains(&LidarState::Silent));
         if let Some(recorded) = recorded(model, &config, &found.sent) {
             let differs = (recorded.iter().zip(&found.poses)).position(|(one, other)| one != other);
             // The last piece of the bytes waits for more.
             let missing = found.poses.len().wrapping_sub(recorded.len());
-            let name = model.name;
             assert!(
                 missing <= 1 && differs.is_none(),
                 "{name}: {missing} poses are not in the recording, {differs:?} is another"
@@ -564,6 +609,25 @@ fn every_lidar_is_started_and_gives_poses_again_after_its_cable_was_out() {
     println!("the slowest took {slowest} ms; what `watch` recorded of {replayed} lidars replays");
     assert!(replayed >= 36, "{replayed}");
     assert!(slowest < 5000, "the supervisor counts on less");
+}
+
+/// A board that is set to an LD06 and told another lidar by a command: as one that is built for it.
+#[test]
+#[cfg_attr(debug_assertions, ignore = "twenty seconds of each of 46 lidars")]
+fn every_lidar_can_be_chosen_by_a_command() {
+    for model in Model::ALL {
+        let found = driven(model, &AppConfig::DEFAULT, true);
+        found.expect_well(model.name);
+        let mut receiver = Receiver::new();
+        let told: Vec<_> = (found.sent.iter())
+            .filter_map(|&byte| receiver.push::<Telemetry>(byte))
+            .filter_map(|message| match message {
+                Telemetry::Ready(ready) => Some(ready.lidar.as_str().to_owned()),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(told, ["ld06", model.name]);
+    }
 }
 
 /// Bits of the poses that `replay` finds in what `watch` recorded of a board: with the zero that the lidar told the board. `None`

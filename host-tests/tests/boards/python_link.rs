@@ -238,7 +238,7 @@ fn the_firmware_understands_pythons_commands() {
     };
     let script = "import sys; sys.path.insert(0, sys.argv[1]); import beamfix_link as b; \
         sys.stdout.buffer.write(b.wheels(1.5, -0.25, 3.0) + b.lidar(bytes(range(94))) + b.ask_health() \
-        + b.send(raw=True, quality=True) + b.gyro(-0.5) + b.start_at(1.0, 2.0, -0.5) + b.ask_ready())";
+        + b.send(raw=True, quality=True) + b.gyro(-0.5) + b.start_at(1.0, 2.0, -0.5) + b.ask_ready() + b.choose('ydlidar-g2'))";
     let folder = file.parent().expect("a folder");
     let output = python
         .args(["-c", script])
@@ -276,10 +276,13 @@ fn the_firmware_understands_pythons_commands() {
                 y: 2.0,
                 theta: -0.5,
             },
-            _ => Command::Ready,
+            6 => Command::Ready,
+            _ => Command::Choose {
+                lidar: "ydlidar-g2",
+            },
         };
         assert_eq!(command, wanted);
         got += 1;
     }
-    assert_eq!((got, receiver.counters().errors), (7, 0));
+    assert_eq!((got, receiver.counters().errors), (8, 0));
 }
