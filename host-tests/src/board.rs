@@ -62,6 +62,8 @@ enum Line {
     Motor,
     /// One UART for both: lidar in, frames out.
     LidarAndTelemetry,
+    /// One UART for both: frames out, commands in.
+    TelemetryAndCommands,
 }
 
 /// All there are.
@@ -116,6 +118,14 @@ pub const STM32F4: Board = Board {
     icount_shift: 6,
     beams: BEAMS,
     uarts: &[Line::Lidar, Line::Telemetry],
+};
+
+/// The same, which takes any lidar by a command, and has a line to it.
+pub const STM32F4_ANY: Board = Board {
+    name: "stm32f4-any",
+    firmware: Firmware::new("nucleo-f446", "thumbv7em-none-eabihf").with("qemu,any-lidar"),
+    uarts: &[Line::Lidar, Line::TelemetryAndCommands],
+    ..STM32F4
 };
 
 /// The emulated Cortex-M0 with the firmware built for size, as a board with 64 KB of flash has it. Not optimised so far that the

@@ -16,11 +16,13 @@ pub type AnyLidar<const N: usize> = Firmware<AnyParser, Odometry<N>, N>;
 macro_rules! any {
     ($($name:ident)*) => {
         /// The parser of any model.
+        #[allow(clippy::large_enum_variant, reason = "there is no heap")]
         pub enum AnyParser {
             $(#[doc = concat!("Of the protocol ", stringify!($name), ".")] $name(parsers::$name),)*
         }
 
         /// A packet of any protocol.
+        #[allow(clippy::large_enum_variant, reason = "there is no heap")]
         pub enum AnyPacket {
             $(#[doc = concat!("Of the protocol ", stringify!($name), ".")] $name(<parsers::$name as Protocol>::Packet),)*
         }

@@ -45,6 +45,26 @@ struct Board {
     clock: Counter<pac::TIM2, 1_000_000>,
     watchdog: IndependentWatchdog,
     reset: Reset,
+    #[cfg(feature = "qemu")]
+    qemu: Qemu,
+}
+
+/// The time in QEMU, whose timers count 62.5 where the chip's count 1.
+#[cfg(feature = "qemu")]
+#[derive(Default)]
+struct Qemu {
+    ticks: u32,
+    us: u32,
+}
+
+#[cfg(feature = "qemu")]
+impl Qemu {
+    fn us(&mut self, ticks: u32) -> u32 {
+        let steps = ticks.wrapping_sub(self.ticks) / 125;
+        self.ticks = self.ticks.wrapping_add(125 * steps);
+        self.us = self.us.wrapping_add(2 * steps);
+        self.us
+    }
 }
 
 impl Hardware for Board {
@@ -55,7 +75,10 @@ impl Hardware for Board {
     }
 
     fn now_us(&mut self) -> u32 {
-        self.clock.now().ticks()
+        let us = self.clock.now().ticks();
+        #[cfg(feature = "qemu")]
+        let us = self.qemu.us(us);
+        us
     }
 
     fn send(&mut self, bytes: &[u8]) {
@@ -154,6 +177,8 @@ fn main() -> ! {
         clock,
         watchdog,
         reset,
+        #[cfg(feature = "qemu")]
+        qemu: Qemu::default(),
     };
     #[cfg(feature = "demo")]
     let board = beamfix_selftest::simulated::Simulated::new(board);

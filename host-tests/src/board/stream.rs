@@ -7,6 +7,7 @@
 use std::{
     io::{ErrorKind, Read as _, Write as _},
     os::unix::net::{UnixListener, UnixStream},
+    path::Path,
     time::{Duration, Instant},
 };
 
@@ -50,9 +51,13 @@ impl Stream {
 
     /// Builds and starts the firmware; it listens once it has sent something.
     pub fn start(board: &Board) -> Result<Self> {
-        let elf = board.build("")?;
+        Self::start_program(board, &board.build("")?)
+    }
+
+    /// Starts a program that was built already.
+    pub fn start_program(board: &Board, elf: &Path) -> Result<Self> {
         let folder = Folder::new()?;
-        let mut command = emulator::start(board, &elf);
+        let mut command = emulator::start(board, elf);
         let mut listeners = Vec::new();
         for (k, line) in board.uarts.iter().enumerate() {
             let path = folder.0.join(format!("uart{k}"));
@@ -76,6 +81,10 @@ impl Stream {
                 Line::Telemetry => telemetry = Some(socket),
                 Line::LidarAndTelemetry => {
                     lidar = Some(socket.try_clone()?);
+                    telemetry = Some(socket);
+                }
+                Line::TelemetryAndCommands => {
+                    commands = Some(socket.try_clone()?);
                     telemetry = Some(socket);
                 }
                 Line::Commands => commands = Some(socket),

@@ -42,7 +42,7 @@ use host_tests::{
 /// Most beams of any model's revolution.
 const BEAMS: usize = 3400;
 /// A round of the loop takes so long (µs), and up to 32 bytes: enough for 2 Mbit/s.
-const ROUND_US: u32 = 125;
+pub const ROUND_US: u32 = 125;
 /// Walls of the room (m): along x and y.
 const ROOM: [f64; 2] = [4.0, 3.0];
 /// Middle and radius of a pillar in it (m).
@@ -68,7 +68,7 @@ enum Stage {
 }
 
 /// A lidar with its cable.
-struct Unit {
+pub struct Unit {
     model: &'static Model,
     encoder: Option<Box<dyn Encoder>>,
     /// When its stream began (µs).
@@ -83,7 +83,7 @@ struct Unit {
 }
 
 impl Unit {
-    fn new(model: &'static Model) -> Self {
+    pub fn new(model: &'static Model) -> Self {
         Self {
             model,
             encoder: None,
@@ -96,7 +96,7 @@ impl Unit {
     }
 
     /// Its supply comes.
-    fn has_power(&mut self, now_us: u64) {
+    pub fn has_power(&mut self, now_us: u64) {
         self.encoder = None;
         self.heard.clear();
         self.line.clear();
@@ -124,7 +124,7 @@ impl Unit {
     }
 
     /// Takes what the board sends.
-    fn hear(&mut self, now_us: u64, bytes: &[u8]) {
+    pub fn hear(&mut self, now_us: u64, bytes: &[u8]) {
         self.heard.extend_from_slice(bytes);
         let heard = std::mem::take(&mut self.heard);
         match self.model.start {
@@ -256,7 +256,7 @@ impl Unit {
     }
 
     /// What it has sent by now, if its motor turned.
-    fn sends(&mut self, now_us: u64, turns: bool) -> Vec<u8> {
+    pub fn sends(&mut self, now_us: u64, turns: bool) -> Vec<u8> {
         if let Some(encoder) = &mut self.encoder {
             if !turns {
                 self.began_us = now_us.saturating_sub(encoder.next_time_us() as u64);

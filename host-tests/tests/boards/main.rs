@@ -4,6 +4,7 @@ mod bench;
 mod bits;
 mod c;
 mod card;
+mod chosen;
 #[path = "../common/mod.rs"]
 mod common;
 mod demo;
