@@ -2,11 +2,12 @@
 
 use super::lidar::{Ranging, quality};
 use super::noise::Noise;
-use super::place::{Nature, Place};
+use super::place::{Moving, Nature, Place};
 use super::pose::{TruePose, wrap};
 use super::robot::{PERIOD, Robot, WheelErrors};
 use super::scenes;
-use super::world::World;
+use super::view::View;
+use super::world::{Circle, World};
 use crate::encoder::{Echo, Encoder};
 
 /// What to simulate.
@@ -86,50 +87,24 @@ pub fn drive(settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
 /// Drives the way of a place with `sensor` on board.
 #[must_use]
 pub fn drive_in(place: Place, settings: &Settings, sensor: &mut dyn Encoder) -> Drive {
-    let Place {
-        mut world,
-        start,
-        way,
-        nature,
-        moving,
-    } = place;
-    let settings = Settings {
-        ranging: nature.ranging(settings.ranging),
-        wheels: nature.wheels(settings.wheels),
-        ..settings.clone()
-    };
-    sensor.sway(nature.sway);
-    let mut underway = Underway::new(start, way, &settings);
-    underway.robot = underway.robot.with_steering(nature.steering);
-    let mut noise = Noise::new(settings.seed, 4);
-    let mut gyro = Vec::new();
+    let mut underway = Underway::new(place, settings, sensor);
     let mut clearance = f64::INFINITY;
     while underway.now < settings.seconds && !underway.robot.arrived() {
         if underway.now >= STANDING {
             underway.robot.steer();
         }
-        moving.place(underway.now, &mut world);
-        if let Some([seconds, turn]) = nature.knock
-            && underway.now >= seconds
-        {
-            underway.settings.mount.theta = settings.mount.theta + turn;
-        }
-        let heading = underway.robot.pose.theta;
-        underway.go_on(&world, sensor);
-        if let Some([bias, sigma]) = nature.gyro {
-            let turned = wrap(underway.robot.pose.theta - heading);
-            let rate = turned / PERIOD + bias + noise.normal(sigma);
-            // Of the middle of the period, as the mean is.
-            gyro.push((underway.now - 0.5 * PERIOD, rate));
-        }
+        underway.go_on(sensor);
         let place = [underway.robot.pose.x, underway.robot.pose.y];
-        clearance = clearance.min(world.clearance(place));
+        clearance = clearance.min(underway.world.clearance(place));
     }
     let Underway {
         robot,
+        world,
+        nature,
         bytes,
         frames,
         moments,
+        gyro,
         ..
     } = underway;
     Drive {
@@ -149,6 +124,10 @@ pub fn drive_in(place: Place, settings: &Settings, sensor: &mut dyn Encoder) -> 
 pub struct Underway {
     /// The robot; between two periods it may be steered, or put elsewhere.
     pub robot: Robot,
+    /// What stands around now.
+    pub world: World,
+    /// What robot and lidar are like.
+    pub nature: Nature,
     /// Since the start (s).
     pub now: f64,
     /// As in [`Drive`].
@@ -157,39 +136,107 @@ pub struct Underway {
     pub frames: Vec<(usize, f64)>,
     /// As in [`Drive`].
     pub moments: Vec<Moment>,
+    /// As in [`Drive`].
+    pub gyro: Vec<(f64, f64)>,
+    moving: Moving,
+    posts: Own,
     settings: Settings,
     noise: Noise,
+    gyro_noise: Noise,
     periods: u32,
+    view: View,
 }
 
 impl Underway {
-    /// Standing at `start`.
+    /// Standing at a place's start.
     #[must_use]
-    pub fn new(start: TruePose, way: Vec<[f64; 2]>, settings: &Settings) -> Self {
+    pub fn new(place: Place, settings: &Settings, sensor: &mut dyn Encoder) -> Self {
+        let Place {
+            world,
+            start,
+            way,
+            nature,
+            moving,
+            posts,
+        } = place;
+        let settings = Settings {
+            ranging: nature.ranging(settings.ranging),
+            wheels: nature.wheels(settings.wheels),
+            ..settings.clone()
+        };
+        sensor.sway(nature.sway);
+        let robot = Robot::new(start, way, settings.wheels, Noise::new(settings.seed, 1));
         Self {
-            robot: Robot::new(start, way, settings.wheels, Noise::new(settings.seed, 1)),
+            robot: robot.with_steering(nature.steering),
+            world,
+            nature,
             now: 0.0,
             bytes: Vec::new(),
             frames: Vec::new(),
             moments: Vec::new(),
-            settings: settings.clone(),
+            gyro: Vec::new(),
+            moving,
+            posts: Own(posts),
             noise: Noise::new(settings.seed, 2),
+            gyro_noise: Noise::new(settings.seed, 4),
+            settings,
             periods: 0,
+            view: View::default(),
         }
     }
 
-    /// Drives on for a period as it was steered, and measures the beams that fall into it.
-    pub fn go_on(&mut self, world: &World, sensor: &mut dyn Encoder) {
+    /// Whether anything of the place moves.
+    #[must_use]
+    pub fn has_moving(&self) -> bool {
+        !self.moving.is_empty()
+    }
+
+    /// What the lidar can measure there.
+    #[must_use]
+    pub fn ranging(&self) -> Ranging {
+        self.settings.ranging
+    }
+
+    /// Drives on for a period as it was steered, and measures what falls into it.
+    pub fn go_on(&mut self, sensor: &mut dyn Encoder) {
+        let (robot, world) = (&self.robot, &mut self.world);
+        self.moving.place(self.now, world);
+        self.moving.follow(robot.pose, robot.driven, world);
+        let heading = robot.pose.theta;
+        self.measure(sensor);
+        if let Some([bias, sigma]) = self.nature.gyro {
+            let turned = wrap(self.robot.pose.theta - heading);
+            let rate = turned / PERIOD + bias + self.gyro_noise.normal(sigma);
+            // Of the middle of the period, as the mean is.
+            self.gyro.push((self.now - 0.5 * PERIOD, rate));
+        }
+    }
+
+    /// Drives on for a period, and measures the beams that fall into it.
+    fn measure(&mut self, sensor: &mut dyn Encoder) {
         let Self {
             robot,
+            world,
+            nature,
             now,
             bytes,
             frames,
             moments,
+            posts,
             settings,
             noise,
             periods,
+            view,
+            ..
         } = self;
+        let mut mount = settings.mount;
+        if let Some([seconds, turn]) = nature.knock
+            && *now >= seconds
+        {
+            mount.theta += turn;
+        }
+        // What moves has moved.
+        view.forget();
         robot.read_wheels();
         *periods += 1;
         let ends = f64::from(*periods) * PERIOD;
@@ -203,8 +250,16 @@ impl Underway {
                     truth: robot.pose,
                     wheels: robot.wheels,
                 });
-                let lidar = robot.pose.then(settings.mount);
-                let range_mm = settings.ranging.measure(world, lidar, bearing, noise)?;
+                let Settings { ranging, .. } = settings;
+                let range_mm = match posts.cast(mount, bearing) {
+                    Some(range) => ranging.at(range, noise)?,
+                    None => {
+                        let lidar = robot.pose.then(mount);
+                        let towards = lidar.theta + bearing;
+                        let seen = view.towards(world, lidar, towards, ranging.width);
+                        ranging.measure(seen, lidar, bearing, noise)?
+                    }
+                };
                 Some(Echo {
                     range_mm,
                     intensity: quality(Some(range_mm)),
@@ -218,6 +273,25 @@ impl Underway {
         }
         robot.advance(ends - *now);
         *now = ends;
+    }
+}
+
+/// The robot's own posts, in its frame.
+#[derive(Debug, Clone)]
+struct Own(Vec<Circle>);
+
+impl Own {
+    /// How far (m) the first is in a direction (rad) from a lidar at this place on the robot.
+    fn cast(&self, mount: TruePose, bearing: f64) -> Option<f64> {
+        if self.0.is_empty() {
+            return None;
+        }
+        let angle = mount.theta + bearing;
+        let towards = [libm::cos(angle), libm::sin(angle)];
+        let ranges = self.0.iter();
+        ranges
+            .filter_map(|post| post.cast([mount.x, mount.y], towards))
+            .reduce(|a, b| if a < b { a } else { b })
     }
 }
 
@@ -241,5 +315,24 @@ mod tests {
             first.truth.between(last.truth).distance() < 0.05,
             "{last:?}"
         );
+    }
+
+    #[test]
+    fn the_robots_own_posts_are_seen_wherever_it_drives() {
+        let text = "rectangle 8 6\nstart -2 -2 0\nway 2 -2 2 2\npost -0.12 0 0.02";
+        let place = Place::parse(text, &mut |_| Err("no map".into())).expect("a place");
+        let run = drive_in(place, &Settings::DEFAULT, &mut Sensor::ld06());
+        // The lidar is 8 cm ahead: the post's face 18 cm behind it, at 6 of 100 directions.
+        let (mut near, mut all) = (0, 0);
+        for packet in run.bytes.chunks(47) {
+            for point in packet[6..42].chunks(3) {
+                let mm = u16::from_le_bytes([point[0], point[1]]);
+                near += u32::from((150..220).contains(&mm));
+                all += 1;
+            }
+        }
+        let wanted = 2.0 * libm::asin(0.02 / 0.2) / core::f64::consts::TAU;
+        let share = f64::from(near) / f64::from(all);
+        assert!((share - wanted).abs() < 0.004, "{share}, not {wanted}");
     }
 }

@@ -24,6 +24,7 @@ pub mod scenes;
 pub mod sensor;
 pub mod spaces;
 pub mod things;
+pub mod view;
 pub mod wheels;
 pub mod world;
 

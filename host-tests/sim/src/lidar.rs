@@ -92,6 +92,14 @@ impl Ranging {
             .then_some(range * 1000.0)
     }
 
+    /// Range (mm, with noise) of something that is so far (m).
+    pub fn at(&self, range: f64, noise: &mut Noise) -> Option<f64> {
+        let range = range + noise.normal(self.sigma) + self.bias;
+        (self.nearest..=self.farthest)
+            .contains(&range)
+            .then_some(range * 1000.0)
+    }
+
     /// How far (m) the face is that a beam returns from, through panes and by mirrors, and the cosine of its incidence.
     fn seen(
         &self,

@@ -289,7 +289,8 @@ impl Segment {
 }
 
 impl Circle {
-    fn cast(&self, from: [f64; 2], towards: [f64; 2]) -> Option<f64> {
+    /// Distance (m) from `from` along the unit vector `towards` to it, if it is met.
+    pub(crate) fn cast(&self, from: [f64; 2], towards: [f64; 2]) -> Option<f64> {
         let to = [self.centre[0] - from[0], self.centre[1] - from[1]];
         let along = to[0] * towards[0] + to[1] * towards[1];
         let across = to[0] * towards[1] - to[1] * towards[0];

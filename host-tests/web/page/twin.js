@@ -178,7 +178,8 @@ function look() {
   state = twin.state();
   if (state.scans !== drawn.scans) {
     drawn.scans = state.scans;
-    for (const part of ['scan', 'keyframe', 'pairs']) drawn[part] = twin.floats(PART[part]);
+    const parts = ['scan', 'keyframe', 'pairs', ...(state.moves ? ['walls', 'columns'] : [])];
+    for (const part of parts) drawn[part] = twin.floats(PART[part]);
     drawn.trails = PART.trails.map((part) => twin.floats(part));
   }
   const kind = document.querySelector('input[name=ground]:checked').value;
@@ -421,10 +422,13 @@ function frame(now) {
     told = now;
     const mean = [0, 1].map((k) => shots.reduce((sum, shot) => sum + shot[k], 0) / shots.length);
     const rate = { count: 1000 / mean[0], work: mean[1], longest: Math.max(...shots.map((shot) => shot[0])) };
-    window.beamfix = { state, mode, rate, toScreen, toWorld };
+    window.beamfix = { state, mode, rate, toScreen, toWorld, faces };
     tell(rate);
   }
 }
+
+/** The numbers of all that stands around, as it is drawn. */
+const faces = () => [...drawn.walls, ...drawn.columns];
 
 /** Takes a file: a world's description, or a recording. */
 async function take(file) {

@@ -6,7 +6,7 @@ use beamfix::scan::Mount;
 use beamfix_sim::encoder::{self, Encoder};
 use beamfix_sim::place::Place;
 use beamfix_sim::robot::PERIOD;
-use beamfix_sim::{Noise, Settings, TruePose, Underway, World};
+use beamfix_sim::{Noise, Settings, TruePose, Underway};
 use host_tests::decode;
 use host_tests::formats::capture::{Content, Recorder, simulated};
 use host_tests::size;
@@ -15,12 +15,11 @@ use crate::twin::BEAMS;
 
 /// Nearest that the robot's middle comes to anything (m): half its width.
 const NEAREST: f64 = 0.13;
-/// Time between two messages of the wheels (periods): 20 a second.
-const WHEELS: u32 = 5;
+/// Messages of the wheels a second, where the place does not say otherwise.
+const WHEELS: f64 = 20.0;
 
 /// The drive so far.
 pub struct Live {
-    pub world: World,
     pub model: &'static Model,
     pub settings: Settings,
     pub underway: Underway,
@@ -28,6 +27,8 @@ pub struct Live {
     recorder: Recorder<Vec<u8>>,
     noise: Noise,
     periods: u32,
+    /// Time between two messages of the wheels (periods).
+    wheels: u32,
     /// Time left of the last call (s).
     left: f64,
 }
@@ -52,13 +53,12 @@ impl Live {
             },
             Ok,
         )?;
-        let settings = simulated::settings(model);
         let settings = Settings {
             seed,
-            ranging: place.nature.ranging(settings.ranging),
-            wheels: place.nature.wheels(settings.wheels),
-            ..settings
+            ..simulated::settings(model)
         };
+        let wheels_per_s = place.nature.wheels_per_s.unwrap_or(WHEELS);
+        let wheels = (1.0 / (wheels_per_s * PERIOD)).round().max(1.0) as u32;
         let mut sensor = encoder::for_model(model);
         ensure!(
             sensor.sway(place.nature.sway),
@@ -72,15 +72,20 @@ impl Live {
             ..Mount::DEFAULT
         };
         recorder.push(0, Content::Mount(mount))?;
+        // It drives by hand.
+        let place = Place {
+            way: Vec::new(),
+            ..place
+        };
         Ok(Self {
-            underway: Underway::new(place.start, Vec::new(), &settings),
-            world: place.world,
+            underway: Underway::new(place, &settings, sensor.as_mut()),
             sensor,
             model,
             settings,
             recorder,
             noise: Noise::new(seed, 3),
             periods: 0,
+            wheels,
             left: 0.0,
         })
     }
@@ -104,11 +109,11 @@ impl Live {
     fn period(&mut self, speed: f64, turn: f64) {
         let before = self.underway.robot.pose;
         self.underway.robot.aim(speed, turn);
-        self.underway.go_on(&self.world, self.sensor.as_mut());
+        self.underway.go_on(self.sensor.as_mut());
         self.periods += 1;
         // A wall holds the robot, and its wheels slip on.
         let after = self.underway.robot.pose;
-        let clearance = |pose: TruePose| self.world.clearance([pose.x, pose.y]);
+        let clearance = |pose: TruePose| self.underway.world.clearance([pose.x, pose.y]);
         if clearance(after) < NEAREST.min(clearance(before)) {
             self.underway.robot.pose = TruePose {
                 theta: after.theta,
@@ -126,7 +131,10 @@ impl Live {
             take(time_us, content);
             Ok(())
         };
-        if self.periods.is_multiple_of(WHEELS) {
+        for (seconds, rate) in underway.gyro.drain(..) {
+            hand((seconds * 1e6) as u64, Content::Gyro(rate as f32))?;
+        }
+        if self.periods.is_multiple_of(self.wheels) {
             let time_us = (underway.now * 1e6) as u64;
             hand(time_us, Content::Wheels(underway.robot.wheels.into()))?;
         }
@@ -154,13 +162,13 @@ impl Live {
 
     /// Puts the robot at some free place, at least 1.5 m from where it was.
     pub fn kidnap(&mut self) {
-        let (low, high) = self.world.extent();
+        let (low, high) = self.underway.world.extent();
         let before = self.underway.robot.pose;
         for _ in 0..10_000 {
             let [x, y] = [0, 1].map(|k| self.noise.even(low[k], high[k]));
             let pose = TruePose::new(x, y, self.noise.even(-3.1, 3.1));
             let far = before.between(pose).distance() > 1.5;
-            if far && self.world.clearance([x, y]) > 0.4 && self.is_free(pose) {
+            if far && self.underway.world.clearance([x, y]) > 0.4 && self.is_free(pose) {
                 self.underway.robot.pose = pose;
                 return;
             }
@@ -172,9 +180,9 @@ impl Live {
         let place = [pose.x, pose.y];
         let is_walled = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]
             .iter()
-            .all(|&towards| self.world.cast(place, towards).is_some());
-        let is_open = self.settings.ranging.farthest > 30.0;
-        self.world.clearance(place) > NEAREST && (is_walled || is_open)
+            .all(|&towards| self.underway.world.cast(place, towards).is_some());
+        let is_open = self.underway.ranging().farthest > 30.0;
+        self.underway.world.clearance(place) > NEAREST && (is_walled || is_open)
     }
 
     /// What `beamfix replay` reads.

@@ -367,7 +367,7 @@ const MOST_CELLS: f64 = 1.2e6;
 
 /// The likelihood field of the world that the robot drives through; an instance has one, which stays until its end.
 fn field(live: &Live) -> Result<LikelihoodField<&'static [u8]>> {
-    let (low, high) = live.world.extent();
+    let (low, high) = live.underway.world.extent();
     let area = (high[0] - low[0]) * (high[1] - low[1]);
     // Cells of 5 cm, larger ones in a large world.
     let resolution = [0.05, 0.1, 0.2]
@@ -376,7 +376,7 @@ fn field(live: &Live) -> Result<LikelihoodField<&'static [u8]>> {
         .unwrap_or(0.4);
     let robot = live.underway.robot.pose;
     let map = ros_map::of_world(
-        &live.world,
+        &live.underway.world,
         low.map(|side| side - 3.0 * resolution),
         high.map(|side| side + 3.0 * resolution),
         resolution as f32,

@@ -83,7 +83,7 @@ impl Twin {
                 })
             }
             Part::Walls => {
-                let segments = self.live()?.world.segments.iter();
+                let segments = self.live()?.underway.world.segments.iter();
                 floats(
                     segments
                         .flat_map(|s| [s.from, s.to])
@@ -92,7 +92,7 @@ impl Twin {
                 )
             }
             Part::Columns => {
-                let circles = self.live()?.world.circles.iter();
+                let circles = self.live()?.underway.world.circles.iter();
                 let numbers = circles.flat_map(|c| [c.centre[0], c.centre[1], c.radius]);
                 floats(numbers.map(|v| v as f32))
             }
@@ -160,6 +160,7 @@ impl Twin {
         if let Some(live) = self.live() {
             let truth = live.underway.robot.pose;
             state["truth"] = pose(truth.into());
+            state["moves"] = json!(live.underway.has_moving());
             state["seconds"] = json!(live.underway.now);
             state["lidar"] = json!(live.model.name);
             if let Some(found) = seen
