@@ -17,7 +17,7 @@ use super::output;
 
 /// Likelihood field of a ROS map (YAML and PGM) for flash: a binary table, a Rust const, a heat map.
 ///
-/// Writes FILE, FILE with .rs and FILE with .png. The table's layout: beamfix::sensor_model::likelihood_field::stored.
+/// Writes FILE, FILE with .rs and the heat map. The table's layout: beamfix::sensor_model::likelihood_field::stored.
 #[derive(clap::Args)]
 pub struct Args {
     /// The map's YAML file.
@@ -25,6 +25,9 @@ pub struct Args {
     /// Where to write the table.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// Where to draw the heat map, .png or .svg. Default: FILE with .png.
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
     /// Spread of hits (m).
     #[arg(long, default_value_t = 0.075)]
     sigma: f32,
@@ -48,7 +51,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         args.out.display()
     );
     let code = args.out.with_extension("rs");
-    let image = args.out.with_extension("png");
+    let image = match &args.picture {
+        Some(path) => {
+            picture::Kind::of(path).context("--picture")?;
+            path.clone()
+        }
+        None => args.out.with_extension("png"),
+    };
     output::spare(&[&args.map], &[Some(&args.out), Some(&code), Some(&image)])?;
     let mut remarks = Vec::new();
     let map = ros_map::read_remarking(&args.map, &mut remarks)?;

@@ -24,11 +24,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     args.check()?;
     let inside = |name: &str| args.out.as_ref().map(|folder| folder.join(name));
     let recorded = ["run.mcap", "bag/run_0.mcap", "seen.yaml", "seen.pgm"].map(inside);
-    let written = [&args.trajectory, &args.picture].map(Option::as_deref);
+    let pictures = args.picture.iter().map(|path| Some(path.as_path()));
     let written: Vec<_> = recorded
         .iter()
         .map(Option::as_deref)
-        .chain(written)
+        .chain([args.trajectory.as_deref()])
+        .chain(pictures)
         .collect();
     let map = args.map.as_deref().unwrap_or(&args.log);
     output::spare(&[&args.log, map], &written)?;

@@ -12,6 +12,7 @@ use beamfix::lidar::Model;
 use beamfix::odometry::{Odometry, Step};
 use beamfix::pipeline::Estimator;
 use beamfix::scan::Mount;
+use beamfix::sensor_model::likelihood_field::{FieldModel, LikelihoodField};
 use beamfix_sim::encoder;
 use beamfix_sim::lidar::Ranging;
 use beamfix_sim::place::{self, Place};
@@ -21,10 +22,12 @@ use host_tests::decode;
 use host_tests::formats::bytes::{self, Content};
 use host_tests::formats::capture::{log, simulated};
 use host_tests::formats::carmen;
+use host_tests::formats::field::of_map;
 use host_tests::formats::ros::bag::ATTACHMENT;
 use host_tests::formats::{Log, ros_map};
 use host_tests::pipeline::{config, follow, is_measured, sparse_odometry};
-use host_tests::report::run::{Run, Setup, Titles};
+use host_tests::report::picture;
+use host_tests::report::run::{Left, Run, Setup, Titles};
 use host_tests::{size, sized};
 use serde_json::json;
 
@@ -39,6 +42,10 @@ pub struct Args {
     /// trajectory.txt, truth.txt, a recording, and lidar.rec or ring.log for `replay`.
     #[arg(long, value_name = "DIR", default_value = "target/beamfix")]
     out: PathBuf,
+    /// Draw into this file too, .png or .svg: what its name says, map, errors, match or field (the likelihood field of the
+    /// place). Several times: several pictures.
+    #[arg(long, value_name = "FILE")]
+    picture: Vec<PathBuf>,
     /// How the run is recorded: run.mcap for Foxglove and Lichtblick (docs/foxglove.json is its layout), or a ROS 2 bag.
     #[arg(long, value_enum, default_value_t = RecordingFormat::Foxglove)]
     recording_format: RecordingFormat,
@@ -80,6 +87,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         seconds: args.seconds,
         ..Settings::DEFAULT
     };
+    for path in &args.picture {
+        picture::Kind::of(path)?;
+    }
     if args.lidar == RING {
         fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
         return ring(args, settings);
@@ -110,6 +120,7 @@ pub fn drive(place: Place, settings: &Settings, model: &'static Model) -> Result
     let moment = |revolution| simulated::moment(&drive, revolution);
     let moments: Option<Vec<Moment>> = revolutions.iter().map(moment).collect();
     let moments = moments.context("a revolution ends at a beam")?;
+    let packets = summary.packets;
     let log = if moments.is_empty() {
         Log::default()
     } else {
@@ -117,14 +128,19 @@ pub fn drive(place: Place, settings: &Settings, model: &'static Model) -> Result
             bytes: bytes.clone(),
             cut: None,
         };
-        log::parse("the simulated drive", content, model.name)?
+        log::of_revolutions(
+            "the simulated drive",
+            content,
+            model,
+            (revolutions, summary),
+        )?
     };
     Ok(Driven {
         drive,
         moments,
         log,
         bytes,
-        packets: summary.packets,
+        packets,
     })
 }
 
@@ -230,20 +246,23 @@ fn ring(args: &Args, settings: Settings) -> Result<ExitCode> {
 /// Side of a cell of a written map (m).
 const CELL: f32 = 0.05;
 
-/// Writes the world that was driven through, with some cells around it, in its own frame.
-fn write_map(drive: &Drive, path: &Path) -> Result<()> {
+/// The world that was driven through as a ROS map, with some cells around it, in its own frame.
+fn map(drive: &Drive) -> Result<ros_map::Map> {
     let (low, high) = drive.world.extent();
     let margin = f64::from(3.0 * CELL);
     let start = drive.moments.first().context("nothing was driven")?.truth;
-    let map = ros_map::of_world(
+    Ok(ros_map::of_world(
         &drive.world,
         low.map(|side| side - margin),
         high.map(|side| side + margin),
         CELL,
         [start.x, start.y],
-    )?;
-    ros_map::write(&map, path)?;
-    Ok(())
+    )?)
+}
+
+/// The likelihood field of the world that was driven through, in its own frame.
+fn field(drive: &Drive) -> Result<LikelihoodField<Vec<u8>>> {
+    Ok(of_map(&map(drive)?, &FieldModel::DEFAULT)?)
 }
 
 /// Follows the robot by what its lidar saw; `lost` counts the keyframes that were given up.
@@ -268,7 +287,7 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
         );
     };
     if let Some(path) = &args.ros_map {
-        write_map(&drive, path)?;
+        ros_map::write(&map(&drive)?, path)?;
     }
     let setup = Setup {
         origin: origin.truth,
@@ -279,11 +298,16 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
         scans: moments.len(),
         drawn: DRAWN,
         has: (true, true),
-        is_sampled: log.capture.is_some(),
+        // A ring of rangers has no bytes.
+        is_sampled: !bytes.is_empty(),
     };
-    let mut run = Run::create(&args.out, args.recording_format.into(), &setup)?;
+    let left = Left {
+        folder: Some((&args.out, args.recording_format.into())),
+        pictures: &args.picture,
+    };
+    let mut run = Run::create(&left, &setup)?;
     // So that `replay` takes the recording too.
-    let recording = if log.capture.is_some() {
+    let recording = if setup.is_sampled {
         run.attach(ATTACHMENT, &bytes)?;
         RECORDING
     } else {
@@ -350,7 +374,9 @@ fn replay<E: Estimator<N, Step = Step>, const N: usize>(
         title,
         caption: caption.clone(),
     };
-    let (files, remarks) = run.finish(titles, Some(drive.world), None)?;
+    let field = left.has_field().then(|| field(&drive)).transpose()?;
+    let field = field.as_ref().map(|field| field.as_slice());
+    let (files, remarks) = run.finish(titles, Some(drive.world.clone()), field)?;
     output::remark(&remarks);
 
     let (scans, lost) = (followed.scans, lost(&followed.estimator));

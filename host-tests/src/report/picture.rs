@@ -54,6 +54,14 @@ pub trait Drawing {
     fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()>
     where
         B::ErrorType: 'static;
+
+    /// The same for a file of lines and shapes, where dots would make it large.
+    fn draw_shapes<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()>
+    where
+        B::ErrorType: 'static,
+    {
+        self.draw(area)
+    }
 }
 
 /// How a picture is kept, by the ending of its file's name.
@@ -85,10 +93,10 @@ pub fn save(drawing: &impl Drawing, path: &Path) -> Result<()> {
     let (width, height) = drawing.size();
     if kind == Kind::Svg {
         let mut text = String::new();
-        fill(
-            drawing,
-            SVGBackend::with_string(&mut text, (width, height)).into_drawing_area(),
-        )?;
+        let area = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
+        area.fill(&WHITE)?;
+        drawing.draw_shapes(&area)?;
+        present(area)?;
         return std::fs::write(path, text).with_context(name);
     }
     let mut pixels = vec![0; 3 * width as usize * height as usize];
@@ -147,6 +155,13 @@ where
 {
     area.fill(&WHITE)?;
     drawing.draw(&area)?;
+    present(area)
+}
+
+fn present<B: DrawingBackend>(area: DrawingArea<B, Shift>) -> Result<()>
+where
+    B::ErrorType: 'static,
+{
     area.present().map_err(|error| anyhow!("drawing: {error}"))
 }
 

@@ -1,15 +1,18 @@
-//! All that a run leaves in its folder: pictures, an animation, a recording.
+//! All that a run leaves behind: pictures, an animation, a recording.
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use beamfix::geometry::Pose;
 use beamfix::scan::Mount;
 use beamfix::sensor_model::likelihood_field::LikelihoodField;
 use beamfix_sim::{TruePose, World};
 
 use super::mcap::McapFile;
+use super::picture::chart::Errors as Chart;
 use super::picture::heat::Heat;
+use super::picture::map::Map;
+use super::picture::pair::PairPicture;
 use super::picture::{self, Drawing};
 use super::rosbag::RosBag;
 use super::sample::Sample;
@@ -23,6 +26,40 @@ pub enum Format {
     Foxglove,
     /// The folder `bag`, a ROS 2 bag.
     Ros2,
+}
+
+/// What is to be left behind, and where.
+pub struct Left<'a> {
+    /// The folder for all of it, and how the run is recorded there.
+    pub folder: Option<(&'a Path, Format)>,
+    /// Pictures beside it: `.png` or `.svg`. What each shows, its name says: `errors`, `match`, `field`, any other the map.
+    pub pictures: &'a [PathBuf],
+}
+
+impl Left<'_> {
+    /// Whether one of the pictures is a likelihood field.
+    #[must_use]
+    pub fn has_field(&self) -> bool {
+        self.pictures.iter().any(|path| shows(path) == Shows::Field)
+    }
+}
+
+/// What a picture shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Shows {
+    Map,
+    Errors,
+    Match,
+    Field,
+}
+
+fn shows(path: &Path) -> Shows {
+    match path.file_stem().and_then(|stem| stem.to_str()) {
+        Some("errors") => Shows::Errors,
+        Some("match") => Shows::Match,
+        Some("field") => Shows::Field,
+        _ => Shows::Map,
+    }
 }
 
 /// What is known before the first scan.
@@ -48,10 +85,10 @@ enum Recording {
 
 /// A run being written.
 pub struct Run {
-    folder: PathBuf,
     track: Track,
     sample: Option<Sample>,
-    recording: Recording,
+    folder: Option<(PathBuf, Recording)>,
+    pictures: Vec<PathBuf>,
     has: (bool, bool),
 }
 
@@ -64,37 +101,41 @@ pub struct Titles {
 }
 
 impl Run {
-    /// Makes the folder and starts the recording.
-    pub fn create(folder: &Path, format: Format, setup: &Setup) -> Result<Self> {
-        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    /// Makes the folder and starts the recording, where there is to be one.
+    pub fn create(left: &Left<'_>, setup: &Setup) -> Result<Self> {
         let mut poses = vec!["estimate"];
         poses.extend(setup.has.0.then_some("truth"));
         poses.extend(setup.has.1.then_some("wheels"));
-        let recording = match format {
-            Format::Foxglove => {
-                let file = McapFile::create(&folder.join("run.mcap"), &poses)?;
-                Recording::Foxglove(Box::new(file))
-            }
-            Format::Ros2 => {
-                Recording::Ros2(Box::new(RosBag::create(&folder.join("bag"), setup.mount)?))
-            }
+        let begun = |(folder, format): (&Path, Format)| -> Result<(PathBuf, Recording)> {
+            std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+            let recording = match format {
+                Format::Foxglove => {
+                    let file = McapFile::create(&folder.join("run.mcap"), &poses)?;
+                    Recording::Foxglove(Box::new(file))
+                }
+                Format::Ros2 => {
+                    let bag = RosBag::create(&folder.join("bag"), setup.mount)?;
+                    Recording::Ros2(Box::new(bag))
+                }
+            };
+            Ok((folder.to_owned(), recording))
         };
         Ok(Self {
-            folder: folder.to_owned(),
+            folder: left.folder.map(begun).transpose()?,
+            pictures: left.pictures.to_vec(),
             track: Track::new(setup.origin, setup.mount.robot_from_lidar, setup.drawn),
             sample: setup
                 .is_sampled
                 .then(|| Sample::new(setup.mount, setup.scans)),
-            recording,
             has: setup.has,
         })
     }
 
     /// Keeps a file's bytes inside `run.mcap`; a bag keeps none.
     pub fn attach(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
-        match &mut self.recording {
-            Recording::Foxglove(file) => file.attach(name, bytes),
-            Recording::Ros2(_) => Ok(()),
+        match &mut self.folder {
+            Some((_, Recording::Foxglove(file))) => file.attach(name, bytes),
+            _ => Ok(()),
         }
     }
 
@@ -104,15 +145,16 @@ impl Run {
         if let Some(sample) = &mut self.sample {
             sample.push(&at, &scan.beams);
         }
-        match &mut self.recording {
-            Recording::Foxglove(file) => {
+        match &mut self.folder {
+            None => Ok(()),
+            Some((_, Recording::Foxglove(file))) => {
                 let or_start = |pose: Option<Pose>| pose.unwrap_or(Pose::IDENTITY);
                 let mut poses = vec![at.estimate];
                 poses.extend(self.has.0.then(|| or_start(at.truth)));
                 poses.extend(self.has.1.then(|| or_start(at.wheels)));
                 file.push(at.time, &points, &poses)
             }
-            Recording::Ros2(bag) => bag.push(scan, &at),
+            Some((_, Recording::Ros2(bag))) => bag.push(scan, &at),
         }
     }
 
@@ -130,51 +172,55 @@ impl Run {
         field: Option<LikelihoodField<&[u8]>>,
     ) -> Result<(Vec<String>, Vec<String>)> {
         let Titles { title, caption } = titles;
-        let map = self.track.map(title.clone(), caption.clone(), world);
-        let chart = self.track.chart(title.clone());
-        let pair = self.sample.as_ref().and_then(Sample::picture);
+        let Self {
+            track,
+            sample,
+            folder,
+            pictures,
+            ..
+        } = self;
         let heat = field.map(|field| Heat {
             title: format!("{title}: likelihood field"),
-            caption,
+            caption: caption.clone(),
             field,
-            path: self.track.driven(),
+            path: track.driven(),
         });
-        let grid = self.track.grid();
-        let folder = self.folder.clone();
-        let mut files = Vec::new();
-        std::thread::scope(|scope| -> Result<()> {
-            // The map is half of the work.
-            let drawn = scope.spawn(|| save(&map, &folder, "map.png"));
-            files.push(save_unless(
-                chart.is_empty(),
-                &chart,
-                &folder,
-                "errors.svg",
-            )?);
-            if let Some(pair) = &pair {
-                files.push(Some(save(pair, &folder, "match.png")?));
-                picture::animate(&pair.frames(), &folder.join("match.gif"))?;
-                files.push(Some("match.gif".into()));
+        let drawn = Drawn {
+            map: track.map(title.clone(), caption, world),
+            chart: track.chart(title),
+            pair: sample.as_ref().and_then(Sample::picture),
+            heat,
+        };
+        let mut remarks = Vec::new();
+        for path in &pictures {
+            remarks.extend(drawn.save(path)?);
+        }
+        let Some((folder, recording)) = folder else {
+            return Ok((Vec::new(), remarks));
+        };
+        let grid = std::thread::scope(|scope| -> Result<_> {
+            // Each of these is a third of the work.
+            let map = scope.spawn(|| save(&drawn.map, &folder, "map.png"));
+            let animated = scope.spawn(|| drawn.animate(&folder.join("match.gif")));
+            let grid = track.grid();
+            drawn.save_rest(&folder)?;
+            for done in [map, animated] {
+                done.join().map_err(|_| anyhow!("a picture's thread"))??;
             }
-            if let Some(heat) = &heat {
-                files.push(Some(save(heat, &folder, "field.png")?));
-            }
-            let name = drawn.join().map_err(|_| anyhow::anyhow!("map.png"))??;
-            files.insert(0, Some(name));
-            Ok(())
+            Ok(grid)
         })?;
+        let mut files = drawn.names();
         if let Some(grid) = &grid {
             ros_map::write(grid, &folder.join("seen.yaml"))?;
-            files.push(Some("seen.yaml seen.pgm".into()));
+            files.push("seen.yaml seen.pgm");
         }
-        let mut remarks = Vec::new();
-        match self.recording {
+        match recording {
             Recording::Foxglove(mut file) => {
                 if let Some(grid) = &grid {
                     file.push_map(grid)?;
                 }
                 file.finish()?;
-                files.push(Some("run.mcap".into()));
+                files.push("run.mcap");
             }
             Recording::Ros2(mut bag) => {
                 if let Some(grid) = &grid {
@@ -182,26 +228,76 @@ impl Run {
                 }
                 remarks.extend(bag.moved());
                 bag.finish()?;
-                files.push(Some("bag/".into()));
+                files.push("bag/");
             }
         }
-        Ok((files.into_iter().flatten().collect(), remarks))
+        Ok((files.into_iter().map(str::to_owned).collect(), remarks))
     }
 }
 
-fn save(drawing: &impl Drawing, folder: &Path, name: &str) -> Result<String> {
-    picture::save(drawing, &folder.join(name))?;
-    Ok(name.into())
+/// What can be drawn of a run.
+struct Drawn<'a> {
+    map: Map,
+    chart: Chart,
+    pair: Option<PairPicture>,
+    heat: Option<Heat<'a>>,
 }
 
-fn save_unless(
-    is_empty: bool,
-    drawing: &impl Drawing,
-    folder: &Path,
-    name: &str,
-) -> Result<Option<String>> {
-    if is_empty {
-        return Ok(None);
+impl Drawn<'_> {
+    /// Draws what the file's name says; a remark where there is no such thing.
+    fn save(&self, path: &Path) -> Result<Option<String>> {
+        let nothing = |why: &str| Ok(Some(format!("{}: not drawn: {why}", path.display())));
+        match shows(path) {
+            Shows::Map => picture::save(&self.map, path)?,
+            Shows::Errors if self.chart.is_empty() => {
+                return nothing("neither a truth nor a covariance is known");
+            }
+            Shows::Errors => picture::save(&self.chart, path)?,
+            Shows::Match => match &self.pair {
+                None => return nothing("no two scans to match"),
+                Some(pair) => picture::save(pair, path)?,
+            },
+            Shows::Field => match &self.heat {
+                None => return nothing("a field is of a map, and there is none"),
+                Some(heat) => picture::save(heat, path)?,
+            },
+        }
+        Ok(None)
     }
-    save(drawing, folder, name).map(Some)
+
+    fn animate(&self, path: &Path) -> Result<()> {
+        match &self.pair {
+            Some(pair) => picture::animate(&pair.frames(), path),
+            None => Ok(()),
+        }
+    }
+
+    /// Draws all but the map and the animation.
+    fn save_rest(&self, folder: &Path) -> Result<()> {
+        if !self.chart.is_empty() {
+            save(&self.chart, folder, "errors.svg")?;
+        }
+        if let Some(pair) = &self.pair {
+            save(pair, folder, "match.png")?;
+        }
+        match &self.heat {
+            Some(heat) => save(heat, folder, "field.png"),
+            None => Ok(()),
+        }
+    }
+
+    /// Names of what is drawn into a folder.
+    fn names(&self) -> Vec<&'static str> {
+        let mut names = vec!["map.png"];
+        names.extend((!self.chart.is_empty()).then_some("errors.svg"));
+        if self.pair.is_some() {
+            names.extend(["match.png", "match.gif"]);
+        }
+        names.extend(self.heat.is_some().then_some("field.png"));
+        names
+    }
+}
+
+fn save(drawing: &impl Drawing, folder: &Path, name: &str) -> Result<()> {
+    picture::save(drawing, &folder.join(name))
 }

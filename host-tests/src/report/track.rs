@@ -280,11 +280,11 @@ impl Track {
         Some(grid)
     }
 
-    /// The estimated path in its own frame (m).
+    /// The estimated path where it lies on the picture (m).
     pub fn driven(&self) -> Vec<[f64; 2]> {
         let poses = self.at.iter().map(|at| at.estimate);
         poses
-            .map(|pose| [f64::from(pose.x), f64::from(pose.y)])
+            .map(|pose| self.on_picture(Point::new(pose.x, pose.y)))
             .collect()
     }
 

@@ -64,6 +64,56 @@ fn every_mode_leaves_pictures_that_are_whole() {
     }
 }
 
+/// PNG or SVG by its ending, the map, errors, a match or a field by its name; of a lidar with more beams than are matched too.
+#[test]
+fn a_picture_is_what_its_name_says() {
+    let folder = folder("leave-pictures");
+    let out = folder.join("run");
+    let names = ["drive", "errors", "match", "field"];
+    let files: Vec<_> = names
+        .iter()
+        .flat_map(|name| [".png", ".svg"].map(|ending| folder.join(format!("{name}{ending}"))))
+        .collect();
+    let drawn: Vec<&str> = files
+        .iter()
+        .flat_map(|file| ["--picture", text(file)])
+        .collect();
+    let simulate = ["simulate", "--lidar", "stl27l", "--seconds", "6", "--out"];
+    let run = beamfix(&[&simulate[..], &[text(&out)], &drawn].concat());
+    let said = String::from_utf8_lossy(&run.stdout);
+    for word in ["lidar.rec", "match.png", "match.gif", "pose hash"] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+    let shows = [
+        "measured points",
+        "standard deviations",
+        "at the guess",
+        "likelihood field",
+    ];
+    for (pair, shows) in files.chunks(2).zip(shows) {
+        let picture = image::open(&pair[0]).expect(shows);
+        assert!(picture.width() >= 1300, "{shows}");
+        let shapes = fs::read_to_string(&pair[1]).expect(shows);
+        assert!(shapes.starts_with("<svg") && shapes.contains(shows));
+        assert!(shapes.matches('<').count() > 100, "{shows}");
+    }
+    // What it recorded gives the same poses, from either file.
+    let hash = said
+        .split("pose hash ")
+        .nth(1)
+        .and_then(|rest| rest.lines().next());
+    for name in ["lidar.rec", "run.mcap"] {
+        let replayed = json(&beamfix(&["replay", text(&out.join(name)), "--json"]));
+        assert_eq!(replayed["pose_hash"].as_str(), hash, "{name}");
+    }
+    // A field is of a map.
+    let field = folder.join("none").join("field.png");
+    let recording = out.join("lidar.rec");
+    let run = beamfix(&["replay", text(&recording), "--picture", text(&field)]);
+    let told = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success() && told.contains("not drawn"), "{told}");
+}
+
 #[test]
 fn a_ros_bag_of_a_ros_bag_gives_its_poses() {
     // That rosbags reads it: host-tests/python/tests/test_recordings.py.

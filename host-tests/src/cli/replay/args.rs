@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::BufWriter;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
 use beamfix::geometry::Pose;
@@ -16,8 +16,8 @@ use host_tests::formats::order::Order;
 use host_tests::formats::trajectory::{Format, Trajectory};
 use host_tests::formats::{Log, Options, Recorded};
 use host_tests::report::picture;
-use host_tests::report::run::{Run, Setup, Titles};
-use host_tests::report::track::{At, Elapsed, Track};
+use host_tests::report::run::{self, Left, Run, Setup, Titles};
+use host_tests::report::track::{At, Elapsed};
 
 use crate::cli::output::{self, RecordingFormat};
 use crate::cli::prior::Prior;
@@ -73,9 +73,10 @@ pub struct Args {
     /// a ROS 2 bag.
     #[arg(long, value_enum, default_value_t = RecordingFormat::Foxglove)]
     pub recording_format: RecordingFormat,
-    /// Draw what was seen and driven into this file, .png or .svg.
+    /// Draw what was seen and driven into this file, .png or .svg; a file called errors, match or field shows errors over time,
+    /// a match before and after, the likelihood field of the map. Several times: several pictures.
     #[arg(long, value_name = "FILE")]
-    pub picture: Option<PathBuf>,
+    pub picture: Vec<PathBuf>,
     /// The lidar's place on the robot (m, m, deg), where the log does not tell or tells it wrong; `,down` after it for a
     /// lidar that hangs head down.
     #[arg(long, value_name = "X,Y,DEG[,down]", value_parser = mount::parse, allow_hyphen_values = true)]
@@ -119,7 +120,7 @@ pub enum Tier {
 impl Args {
     /// Refuses what does not go together, before anything is read or written.
     pub fn check(&self) -> Result<()> {
-        if let Some(path) = &self.picture {
+        for path in &self.picture {
             picture::Kind::of(path)?;
         }
         match (&self.map, self.mode) {
@@ -187,16 +188,23 @@ impl Args {
             has: (false, start.is_some()),
             is_sampled,
         };
-        let run = |folder: &PathBuf| Run::create(folder, self.recording_format.into(), &setup);
+        let left = Left {
+            folder: self.folder(),
+            pictures: &self.picture,
+        };
+        let is_wanted = left.folder.is_some() || !left.pictures.is_empty();
+        let run = is_wanted.then(|| Run::create(&left, &setup));
         Ok(Leave {
-            track: self
-                .picture
-                .is_some()
-                .then(|| Track::new(TruePose::default(), mount.robot_from_lidar, drawn)),
-            run: self.out.as_ref().map(run).transpose()?,
+            run: run.transpose()?,
             elapsed: Elapsed::default(),
             start,
         })
+    }
+
+    /// The folder for all that a run leaves behind.
+    fn folder(&self) -> Option<(&Path, run::Format)> {
+        let folder = self.out.as_deref()?;
+        Some((folder, self.recording_format.into()))
     }
 
     /// How many of a log's scans are replayed.
@@ -213,7 +221,6 @@ impl Args {
 
 /// What a replay leaves behind.
 pub struct Leave {
-    track: Option<Track>,
     run: Option<Run>,
     elapsed: Elapsed,
     /// The wheels' first pose.
@@ -238,9 +245,6 @@ impl Leave {
             truth: None,
             wheels: wheels.map(|(start, now)| start.between(now)),
         };
-        if let Some(track) = &mut self.track {
-            track.push(at, &scan.beams);
-        }
         match &mut self.run {
             Some(run) => run.push(scan, at),
             None => Ok(()),
@@ -254,14 +258,14 @@ impl Leave {
         (title, caption): (String, String),
         field: Option<LikelihoodField<&[u8]>>,
     ) -> Result<()> {
-        if let (Some(track), Some(path)) = (self.track, &args.picture) {
-            picture::save(&track.map(title.clone(), caption.clone(), None), path)?;
-        }
-        if let (Some(run), Some(folder)) = (self.run, &args.out) {
-            let (files, mut remarks) = run.finish(Titles { title, caption }, None, field)?;
+        let Some(run) = self.run else {
+            return Ok(());
+        };
+        let (files, mut remarks) = run.finish(Titles { title, caption }, None, field)?;
+        if let Some(folder) = &args.out {
             remarks.push(format!("{}: {}", folder.display(), files.join(" ")));
-            output::remark(&remarks);
         }
+        output::remark(&remarks);
         Ok(())
     }
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Result, ensure};
 use beamfix::geometry::Pose;
+use beamfix::lidar::Model;
 use beamfix::scan::{Assembler, Beam, Mount};
 
 use super::super::{Capture, Log, Recorded, bytes, thinned};
@@ -60,6 +61,12 @@ pub fn revolutions(lidar: &str, stream: &[u8]) -> Result<(Vec<Revolution>, Summa
         last_us = row.time_us;
         count += 1;
     })?;
+    add_wheels(&mut revolutions, stream);
+    Ok((revolutions, summary))
+}
+
+/// Gives each revolution the wheels' last pose before the piece that completed it.
+pub(super) fn add_wheels(revolutions: &mut [Revolution], stream: &[u8]) {
     let mut wheels = capture::pieces(stream)
         .into_iter()
         .enumerate()
@@ -68,12 +75,11 @@ pub fn revolutions(lidar: &str, stream: &[u8]) -> Result<(Vec<Revolution>, Summa
             _ => None,
         })
         .peekable();
-    for revolution in &mut revolutions {
+    for revolution in revolutions {
         while let Some((_, pose)) = wheels.next_if(|(k, _)| *k < revolution.piece) {
             revolution.wheels = Some(pose);
         }
     }
-    Ok((revolutions, summary))
 }
 
 /// Reads a capture as a log; the stamps are the sensor's clock at each revolution's last beam.
@@ -88,10 +94,21 @@ pub fn parse(name: &str, mut content: bytes::Content, lidar: &str) -> Result<Log
         content.bytes = capture;
     }
     let model = decode::model_of(name, lidar, &content.bytes)?;
-    let (revolutions, summary) = revolutions(model.name, &content.bytes)?;
+    let decoded = revolutions(model.name, &content.bytes)?;
+    of_revolutions(name, content, model, decoded)
+}
+
+/// A log of the revolutions that a capture was decoded into.
+pub fn of_revolutions(
+    name: &str,
+    content: bytes::Content,
+    model: &'static Model,
+    (revolutions, summary): (Vec<Revolution>, Summary),
+) -> Result<Log> {
     ensure!(
         summary.packets > 0,
-        "{name}: no packet of the lidar {lidar} in {} bytes; {} failed their check",
+        "{name}: no packet of the lidar {} in {} bytes; {} failed their check",
+        model.name,
         content.bytes.len(),
         summary.check_errors
     );

@@ -24,9 +24,6 @@ pub fn settings(model: &Model) -> Settings {
     }
 }
 
-/// Pieces before the first bytes.
-const HEAD: usize = 2;
-
 /// A capture of a drive with a lidar of `model` at `mount`, its revolutions, and what its decoder counted.
 ///
 /// The wheels come in together with the bytes that complete a revolution, or at a rate of their own where the place says so;
@@ -36,39 +33,62 @@ pub fn capture(
     mount: TruePose,
     model: &Model,
 ) -> Result<(Vec<u8>, Vec<Revolution>, Summary)> {
-    let write = |revolutions: &[Revolution]| -> Result<Vec<u8>> {
-        let mut revolutions = revolutions.iter().peekable();
-        let mut recorder = Recorder::new(Vec::new())?;
-        recorder.push(0, Content::Lidar(model.name))?;
-        let mount = Mount {
-            robot_from_lidar: mount.into(),
-            ..Mount::DEFAULT
-        };
-        recorder.push(0, Content::Mount(mount))?;
-        let mut start = 0;
-        let mut beside = beside(drive).into_iter().peekable();
-        for (frame, &(end, measured_us)) in drive.frames.iter().enumerate() {
-            let on_line_us = (end - start) as f64 * 1e7 / f64::from(model.baud);
-            let time_us = (measured_us + on_line_us) as u64;
-            while let Some((us, content)) = beside.next_if(|(us, _)| *us <= time_us) {
-                recorder.push(us, content)?;
-            }
-            while let Some(revolution) =
-                revolutions.next_if(|revolution| revolution.piece <= frame + HEAD)
-            {
-                if drive.nature.wheels_per_s.is_none()
-                    && let Some(now) = moment(drive, revolution)
-                {
-                    recorder.push(time_us, Content::Wheels(now.wheels.into()))?;
-                }
-            }
-            recorder.push(time_us, Content::Bytes(&drive.bytes[start..end]))?;
-            start = end;
-        }
-        Ok(recorder.finish()?)
+    // The lidar's bytes alone, to see with which frame a revolution is complete.
+    let (bytes, piece_of) = write(drive, mount, model, None)?;
+    let (mut revolutions, summary) = log::revolutions(model.name, &bytes)?;
+    let first = piece_of.first().copied().unwrap_or(0);
+    let frames: Vec<usize> = revolutions.iter().map(|r| r.piece - first).collect();
+    let wheels: Vec<_> = frames
+        .iter()
+        .zip(&revolutions)
+        .filter_map(|(&frame, revolution)| Some((frame, moment(drive, revolution)?.wheels)))
+        .collect();
+    let (bytes, piece_of) = write(drive, mount, model, Some(&wheels))?;
+    for (revolution, frame) in revolutions.iter_mut().zip(frames) {
+        revolution.piece = piece_of[frame];
+    }
+    log::add_wheels(&mut revolutions, &bytes);
+    Ok((bytes, revolutions, summary))
+}
+
+/// A drive's lidar as pieces, and what comes in beside it: the wheels with these frames, or at a rate of their own, and a
+/// gyroscope. Gives the number of each frame's piece too.
+fn write(
+    drive: &Drive,
+    mount: TruePose,
+    model: &Model,
+    wheels: Option<&[(usize, TruePose)]>,
+) -> Result<(Vec<u8>, Vec<usize>)> {
+    let mut recorder = Recorder::new(Vec::new())?;
+    recorder.push(0, Content::Lidar(model.name))?;
+    let mount = Mount {
+        robot_from_lidar: mount.into(),
+        ..Mount::DEFAULT
     };
-    let (revolutions, summary) = log::revolutions(model.name, &write(&[])?)?;
-    Ok((write(&revolutions)?, revolutions, summary))
+    recorder.push(0, Content::Mount(mount))?;
+    let (mut start, mut pieces) = (0, 2);
+    let mut piece_of = Vec::with_capacity(drive.frames.len());
+    let with_frames = wheels.filter(|_| drive.nature.wheels_per_s.is_none());
+    let mut with_frames = with_frames.unwrap_or_default().iter().peekable();
+    let beside = wheels.map_or_else(Vec::new, |_| beside(drive));
+    let mut beside = beside.into_iter().peekable();
+    for (frame, &(end, measured_us)) in drive.frames.iter().enumerate() {
+        let on_line_us = (end - start) as f64 * 1e7 / f64::from(model.baud);
+        let time_us = (measured_us + on_line_us) as u64;
+        while let Some((us, content)) = beside.next_if(|(us, _)| *us <= time_us) {
+            recorder.push(us, content)?;
+            pieces += 1;
+        }
+        while let Some((_, pose)) = with_frames.next_if(|(with, _)| *with <= frame) {
+            recorder.push(time_us, Content::Wheels((*pose).into()))?;
+            pieces += 1;
+        }
+        recorder.push(time_us, Content::Bytes(&drive.bytes[start..end]))?;
+        piece_of.push(pieces);
+        pieces += 1;
+        start = end;
+    }
+    Ok((recorder.finish()?, piece_of))
 }
 
 /// What comes in at a rate of its own: wheels and gyroscope, with their times (µs).
@@ -120,4 +140,34 @@ pub fn moment(drive: &Drive, revolution: &Revolution) -> Option<Moment> {
         .moments
         .get(revolution.ends_at.checked_sub(1)?)
         .copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use beamfix_sim::encoder::ld06::Sensor;
+    use beamfix_sim::{Place, drive_in};
+
+    /// A gyroscope that tells a hundred times a second delays nothing.
+    #[test]
+    fn the_wheels_come_with_the_revolution_that_they_belong_to() {
+        let empty = "rectangle 8 6\nstart -2 -2 0\nway 2 -2 2 2 -2 2";
+        for rest in ["", "\ngyro 1 0.5"] {
+            let place = Place::parse(&format!("{empty}{rest}"), &mut |_| Err("no map".into()));
+            let settings = Settings {
+                seconds: 20.0,
+                ..Settings::DEFAULT
+            };
+            let drive = drive_in(place.expect("a place"), &settings, &mut Sensor::ld06());
+            let (bytes, revolutions, _) =
+                capture(&drive, settings.mount, &Model::LDROBOT_LD06).expect("memory");
+            assert!(revolutions.len() > 150, "{}", revolutions.len());
+            let (again, _) = log::revolutions("ld06", &bytes).expect("an LD06");
+            for (revolution, again) in revolutions.iter().zip(&again) {
+                let wheels = moment(&drive, revolution).map(|now| now.wheels.into());
+                assert_eq!(revolution.wheels, wheels);
+                assert_eq!((again.wheels, again.piece), (wheels, revolution.piece));
+            }
+        }
+    }
 }

@@ -26,13 +26,13 @@ const HEADER: u32 = 116;
 /// Where nothing is explored.
 const UNEXPLORED: RGBColor = RGBColor(90, 100, 120);
 
-/// Seen on black, red and white.
+/// Seen on black, red and yellow.
 const PATH: RGBColor = RGBColor(0, 170, 230);
 
-/// From black over red to white as a beam likes to end there.
+/// From black over red to a pale yellow, which is no paper, as a beam likes to end there.
 fn glow(byte: u8) -> RGBColor {
-    let part = |from: i32| ((i32::from(byte) - from) * 3).clamp(0, 255) as u8;
-    RGBColor(part(0), part(85), part(170))
+    let part = |from: i32, most: i32| ((i32::from(byte) - from) * 3).clamp(0, most) as u8;
+    RGBColor(part(0, 255), part(85, 255), part(170, 150))
 }
 
 impl Heat<'_> {
@@ -46,6 +46,40 @@ impl Heat<'_> {
             let corner = shape.origin() * Point::new(x, y);
             [corner.x.into(), corner.y.into()]
         }))
+    }
+}
+
+impl Heat<'_> {
+    /// What stands over the map; gives the area below it.
+    fn head<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<DrawingArea<B, Shift>>
+    where
+        B::ErrorType: 'static,
+    {
+        let (top, body) = area.split_vertically(HEADER);
+        let path = (!self.path.is_empty()).then_some(("estimated path", PATH, 4));
+        let legend: Vec<_> = [
+            ("beams end here", glow(255), 12),
+            ("near a surface", glow(120), 12),
+            ("nothing near", glow(0), 12),
+            ("unexplored", UNEXPLORED, 12),
+        ]
+        .into_iter()
+        .chain(path)
+        .collect();
+        header(&top, 70, &self.title, &self.caption, &legend)?;
+        Ok(body)
+    }
+
+    /// The colour of a cell's byte.
+    fn colours(&self) -> impl Fn(u8) -> RGBColor {
+        let unexplored = stored::header(&self.field)[5];
+        move |byte| {
+            if byte == unexplored {
+                UNEXPLORED
+            } else {
+                glow(byte)
+            }
+        }
     }
 }
 
@@ -63,25 +97,14 @@ impl Drawing for Heat<'_> {
     where
         B::ErrorType: 'static,
     {
-        let (top, body) = area.split_vertically(HEADER);
-        let unexplored = stored::header(&self.field)[5];
-        let path = (!self.path.is_empty()).then_some(("estimated path", PATH, 4));
-        let legend: Vec<_> = [
-            ("beams end here", glow(190), 12),
-            ("near a surface", glow(120), 12),
-            ("nothing near", glow(0), 12),
-            ("unexplored", UNEXPLORED, 12),
-        ]
-        .into_iter()
-        .chain(path)
-        .collect();
-        header(&top, 70, &self.title, &self.caption, &legend)?;
+        let body = self.head(area)?;
         let (low, high) = self.limits();
         let (mut chart, limits) = metres(&body, low, high, "")?;
         let [x_axis, y_axis] = &limits;
         let plot = chart.plotting_area();
         let (width, height) = plot.dim_in_pixel();
         let shape = self.field.grid().shape();
+        let colour = self.colours();
         for row in 0..height {
             for column in 0..width {
                 let along = |axis: &std::ops::Range<f64>, k: u32, of: u32| {
@@ -92,12 +115,38 @@ impl Drawing for Heat<'_> {
                 let Some(byte) = self.field.grid().get(cell_x, cell_y) else {
                     continue;
                 };
-                let colour = if byte == unexplored {
-                    UNEXPLORED
-                } else {
-                    glow(byte)
-                };
-                plot.draw_pixel((x, y), &colour).map_err(fail)?;
+                plot.draw_pixel((x, y), &colour(byte)).map_err(fail)?;
+            }
+        }
+        line(&mut chart, &limits, &self.path, PATH.stroke_width(3))
+    }
+
+    /// A box for each run of cells of one colour in a row.
+    fn draw_shapes<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()>
+    where
+        B::ErrorType: 'static,
+    {
+        let body = self.head(area)?;
+        let (low, high) = self.limits();
+        let (mut chart, limits) = metres(&body, low, high, "")?;
+        let grid = self.field.grid();
+        let shape = grid.shape();
+        let side = shape.resolution();
+        let colour = self.colours();
+        let corner = |x: usize, y: usize| {
+            let corner = shape.origin() * Point::new(x as f32 * side, y as f32 * side);
+            (f64::from(corner.x), f64::from(corner.y))
+        };
+        let width = usize::from(shape.width());
+        for (y, row) in grid.cells().chunks(width.max(1)).enumerate() {
+            let mut x = 0;
+            for run in row.chunk_by(|a, b| colour(*a) == colour(*b)) {
+                let end = x + run.len();
+                let corners = [(x, y), (end, y), (end, y + 1), (x, y + 1)];
+                let corners: Vec<_> = corners.map(|(x, y)| corner(x, y)).into();
+                let shape = Polygon::new(corners, colour(run[0]).filled());
+                chart.draw_series([shape]).map_err(fail)?;
+                x = end;
             }
         }
         line(&mut chart, &limits, &self.path, PATH.stroke_width(3))
