@@ -1,6 +1,10 @@
 //! What a run leaves behind: pictures, scores, pose hashes, tracks and MCAP files.
 
 #[cfg(not(target_family = "wasm"))]
+pub mod foxglove;
+#[cfg(not(target_family = "wasm"))]
+pub mod live;
+#[cfg(not(target_family = "wasm"))]
 pub mod mcap;
 #[cfg(not(target_family = "wasm"))]
 pub mod picture;

@@ -14,6 +14,7 @@ use beamfix_app::{
 use crate::decode::Unwrapped;
 use crate::formats::capture::{Content, Recorder, telemetry};
 use crate::report::hash::PoseHash;
+use crate::report::live::Server;
 use crate::report::picture::{
     colour,
     map::{Map, Path},
@@ -27,6 +28,8 @@ pub struct Watch<W> {
     receiver: Receiver,
     recorder: Option<Recorder<W>>,
     qualities: Option<W>,
+    /// Where scans and poses are sent on to, if anywhere.
+    pub server: Option<Server>,
     /// Starts of the board.
     pub starts: u32,
     /// What it said at its start.
@@ -71,6 +74,7 @@ impl<W: Write> Watch<W> {
             receiver: Receiver::new(),
             recorder: recording.map(Recorder::new).transpose()?,
             qualities,
+            server: None,
             starts: 0,
             ready: None,
             health: None,
@@ -219,6 +223,9 @@ impl<W: Write> Watch<W> {
         let [x, y, theta] = pose.pose;
         let robot = Pose { x, y, theta };
         self.revolutions += 1;
+        if let Some(server) = &self.server {
+            server.scan(&revolution, robot);
+        }
         // Of a long run, a part of all revolutions.
         if self.points.len() > POINTS {
             let mut k = 0;

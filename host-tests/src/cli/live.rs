@@ -19,6 +19,7 @@ use host_tests::formats::capture::{Content, Piece, Recorder};
 use host_tests::formats::mount;
 use host_tests::pipeline::{Pieces, config, is_measured};
 use host_tests::report::hash::PoseHash;
+use host_tests::report::live::{ADDRESS, Server};
 use host_tests::report::terminal::View;
 use host_tests::report::track::{At, Elapsed, Track};
 use host_tests::size::{self, SIZES};
@@ -53,6 +54,10 @@ pub struct Args {
     /// Print a line instead of drawing in the terminal.
     #[arg(long)]
     plain: bool,
+    /// Serve scans and poses to Foxglove or Lichtblick at ws://HOST:PORT, 127.0.0.1:8765 unless told; needs a build with
+    /// `--features host-tests/foxglove`.
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, require_equals = true, default_missing_value = ADDRESS)]
+    foxglove: Option<String>,
     /// Stop after so many scans.
     #[arg(long, value_name = "N")]
     scans: Option<usize>,
@@ -130,6 +135,7 @@ struct Live<'a> {
 /// What came of the revolutions so far.
 struct Seen {
     track: Track,
+    server: Option<Server>,
     elapsed: Elapsed,
     hash: PoseHash,
     scans: usize,
@@ -173,6 +179,7 @@ impl<'a> Live<'a> {
             recorder,
             seen: Seen {
                 track,
+                server: output::serve(args.foxglove.as_deref())?,
                 elapsed: Elapsed::default(),
                 hash: PoseHash::new(),
                 scans: 0,
@@ -219,12 +226,19 @@ impl<'a> Live<'a> {
         }
         self.drawn = Instant::now();
         let status = self.seen.status();
-        match &mut self.view {
-            Some(view) => {
-                let title = format!("beamfix: live from {}", self.args.port);
-                view.draw(&self.seen.track.map(title, status, None))?;
-            }
-            None => eprintln!("{status}"),
+        if self.view.is_none() {
+            eprintln!("{status}");
+        }
+        if self.view.is_none() && self.seen.server.is_none() {
+            return Ok(());
+        }
+        let title = format!("beamfix: live from {}", self.args.port);
+        let map = self.seen.track.map(title, status, None);
+        if let Some(server) = &mut self.seen.server {
+            server.seen(&map.points);
+        }
+        if let Some(view) = &mut self.view {
+            view.draw(&map)?;
         }
         Ok(())
     }
@@ -272,7 +286,10 @@ impl Seen {
             truth: None,
             wheels: None,
         };
-        self.track.push(at, &beams);
+        let points = self.track.push(at, &beams);
+        if let Some(server) = &self.server {
+            server.scan(&points, step.pose);
+        }
     }
 
     /// One line: how it is.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use clap::ValueEnum;
 use host_tests::formats::ros_map;
+use host_tests::report::live::Server;
 use host_tests::report::run::Format;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
@@ -108,4 +109,15 @@ fn is_same(one: &Path, other: &Path) -> bool {
     {
         one.is_file() && one.modified().ok() == other.modified().ok() && one.len() == other.len()
     }
+}
+
+/// Starts the server of `--foxglove`, and tells where it listens.
+pub fn serve(address: Option<&str>) -> Result<Option<Server>> {
+    let Some(address) = address else {
+        return Ok(None);
+    };
+    let server = Server::start(address)?;
+    let host = address.rsplit_once(':').map_or(address, |(host, _)| host);
+    remark(&[format!("Foxglove: ws://{host}:{}", server.port())]);
+    Ok(Some(server))
 }

@@ -15,6 +15,7 @@ use beamfix_sim::drive::{Settings, drive};
 use beamfix_sim::encoder::ld06::Sensor;
 use host_tests::board::{Board, commands::Commands, stream::Stream};
 use host_tests::bringup;
+use host_tests::report::live::ADDRESS;
 use host_tests::report::picture::{self, Kind};
 use host_tests::report::terminal::View;
 use host_tests::watch::Watch;
@@ -53,6 +54,10 @@ pub struct Args {
     /// Print a line instead of drawing in the terminal.
     #[arg(long)]
     plain: bool,
+    /// Serve scans and poses to Foxglove or Lichtblick at ws://HOST:PORT, 127.0.0.1:8765 unless told; needs a build with
+    /// `--features host-tests/foxglove`.
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, require_equals = true, default_missing_value = ADDRESS)]
+    foxglove: Option<String>,
     /// The serial line's speed.
     #[arg(long, value_name = "BAUD", default_value_t = 921_600)]
     baud: u32,
@@ -103,6 +108,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         silent: false,
         view: if args.plain { None } else { View::open() },
     };
+    live.watch.server = output::serve(args.foxglove.as_deref())?;
     if let Some(folder) = args.out.parent() {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     }
@@ -288,6 +294,9 @@ impl Live<'_> {
         let map = self.watch.map(&title);
         picture::save(&map, &next)?;
         replace(&next, &self.args.out)?;
+        if let Some(server) = &mut self.watch.server {
+            server.seen(&map.points);
+        }
         if let Some(view) = &mut self.view {
             view.draw(&map).context("the terminal")?;
         }

@@ -5,12 +5,11 @@ use std::io::BufWriter;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use base64::{Engine, prelude::BASE64_STANDARD};
 use beamfix::geometry::{Point, Pose};
-use beamfix::grid::occupancy::{self, Cell};
 use mcap::records::MessageHeader;
-use serde_json::{Value, json};
+use serde_json::Value;
 
+use super::foxglove::{self, Kind};
 use crate::formats::ros_map::Map;
 
 /// An MCAP file being written.
@@ -26,8 +25,6 @@ pub struct McapFile {
     last: f64,
 }
 
-const FRAME: &str = "map";
-
 impl McapFile {
     /// Starts a file whose poses are named `poses`; the first one carries the lidar's points.
     pub fn create(path: &Path, poses: &[&str]) -> Result<Self> {
@@ -39,24 +36,19 @@ impl McapFile {
         let mut writer = options
             .create(BufWriter::new(file))
             .with_context(|| name.clone())?;
-        let mut channel = |topic: &str, kind: &str, schema: Value| -> Result<u16> {
-            let id = writer.add_schema(kind, "jsonschema", schema.to_string().as_bytes())?;
-            Ok(writer.add_channel(id, topic, "json", &Default::default())?)
+        let mut channel = |topic: &str, kind: Kind| -> Result<u16> {
+            let schema = kind.schema().to_string();
+            let id = writer.add_schema(kind.name(), foxglove::SCHEMA, schema.as_bytes())?;
+            Ok(writer.add_channel(id, topic, foxglove::MESSAGE, &Default::default())?)
         };
-        let clouds = channel("/points", "foxglove.PointCloud", cloud_schema())?;
-        let transforms = channel("/tf", "foxglove.FrameTransform", transform_schema())?;
-        let maps = channel("/map", "foxglove.Grid", grid_schema())?;
+        let clouds = channel("/points", Kind::Cloud)?;
+        let transforms = channel("/tf", Kind::Transform)?;
+        let maps = channel("/map", Kind::Grid)?;
         let poses = poses
             .iter()
             .map(|pose| {
-                Ok((
-                    (*pose).to_owned(),
-                    channel(
-                        &format!("/pose/{pose}"),
-                        "foxglove.PoseInFrame",
-                        pose_schema(),
-                    )?,
-                ))
+                let id = channel(&format!("/pose/{pose}"), Kind::Pose)?;
+                Ok(((*pose).to_owned(), id))
             })
             .collect::<Result<_>>()?;
         Ok(Self {
@@ -93,54 +85,28 @@ impl McapFile {
         poses_in_map: &[Pose],
     ) -> Result<()> {
         self.last = seconds;
-        let stamp = stamp(seconds);
-        let data: Vec<u8> = points_in_robot
-            .iter()
-            .flat_map(|p| [p.x, p.y])
-            .flat_map(f32::to_le_bytes)
-            .collect();
-        let cloud = json!({
-            "timestamp": stamp, "frame_id": "robot", "pose": pose_json(Pose::IDENTITY), "point_stride": 8,
-            "fields": [{"name": "x", "offset": 0, "type": 7}, {"name": "y", "offset": 4, "type": 7}],
-            "data": BASE64_STANDARD.encode(data),
-        });
-        self.write(self.clouds, seconds, &cloud)?;
-        for (&pose, channel) in poses_in_map
-            .iter()
-            .zip(self.poses.iter().map(|(_, id)| *id).collect::<Vec<_>>())
-        {
-            let message = json!({"timestamp": stamp, "frame_id": FRAME, "pose": pose_json(pose)});
-            self.write(channel, seconds, &message)?;
+        self.write(
+            self.clouds,
+            seconds,
+            &foxglove::cloud(seconds, points_in_robot),
+        )?;
+        let channels: Vec<u16> = self.poses.iter().map(|(_, id)| *id).collect();
+        for (&pose, channel) in poses_in_map.iter().zip(channels) {
+            self.write(channel, seconds, &foxglove::pose(seconds, pose))?;
         }
         if let Some(&pose) = poses_in_map.first() {
-            let placed = pose_json(pose);
-            let message = json!({
-                "timestamp": stamp, "parent_frame_id": FRAME, "child_frame_id": "robot",
-                "translation": placed["position"], "rotation": placed["orientation"],
-            });
-            self.write(self.transforms, seconds, &message)?;
+            self.write(
+                self.transforms,
+                seconds,
+                &foxglove::transform(seconds, pose),
+            )?;
         }
         Ok(())
     }
 
     /// Writes what was seen as a map: 0 free, 100 occupied, 255 unknown.
     pub fn push_map(&mut self, map: &Map) -> Result<()> {
-        let shape = map.shape();
-        let value = |&byte: &u8| match occupancy::cell(byte) {
-            Cell::Free => 0,
-            Cell::Occupied => 100,
-            Cell::Unknown => 255u8,
-        };
-        let data: Vec<u8> = map.cells().iter().map(value).collect();
-        let side = shape.resolution();
-        let message = json!({
-            "timestamp": stamp(self.last), "frame_id": FRAME, "pose": pose_json(shape.origin()),
-            "column_count": shape.width(), "cell_size": {"x": side, "y": side},
-            "row_stride": shape.width(), "cell_stride": 1,
-            "fields": [{"name": "occupancy", "offset": 0, "type": 1}],
-            "data": BASE64_STANDARD.encode(data),
-        });
-        self.write(self.maps, self.last, &message)
+        self.write(self.maps, self.last, &foxglove::grid(self.last, map))
     }
 
     /// Closes the file: without this it has no index.
@@ -159,94 +125,6 @@ impl McapFile {
             .write_to_known_channel(&header, bytes.as_bytes())
             .with_context(|| self.name.clone())
     }
-}
-
-fn stamp(seconds: f64) -> Value {
-    json!({"sec": seconds as u64, "nsec": (seconds.fract() * 1e9) as u64})
-}
-
-fn pose_json(pose: Pose) -> Value {
-    let half = 0.5 * f64::from(pose.theta);
-    json!({
-        "position": {"x": pose.x, "y": pose.y, "z": 0},
-        "orientation": {"x": 0, "y": 0, "z": libm::sin(half), "w": libm::cos(half)},
-    })
-}
-
-fn object(properties: Value) -> Value {
-    json!({"type": "object", "properties": properties})
-}
-
-fn numbers(names: &[&str]) -> Value {
-    object(
-        names
-            .iter()
-            .map(|name| ((*name).to_owned(), json!({"type": "number"})))
-            .collect(),
-    )
-}
-
-fn stamp_schema() -> Value {
-    json!({"type": "object", "title": "time", "properties": {
-        "sec": {"type": "integer", "minimum": 0}, "nsec": {"type": "integer", "minimum": 0, "maximum": 999_999_999},
-    }})
-}
-
-fn placed_schema() -> Value {
-    object(
-        json!({"position": numbers(&["x", "y", "z"]), "orientation": numbers(&["x", "y", "z", "w"])}),
-    )
-}
-
-fn titled(title: &str, properties: Value) -> Value {
-    let mut schema = object(properties);
-    schema["title"] = json!(title);
-    schema
-}
-
-fn pose_schema() -> Value {
-    titled(
-        "foxglove.PoseInFrame",
-        json!({"timestamp": stamp_schema(), "frame_id": {"type": "string"}, "pose": placed_schema()}),
-    )
-}
-
-fn transform_schema() -> Value {
-    titled(
-        "foxglove.FrameTransform",
-        json!({
-            "timestamp": stamp_schema(), "parent_frame_id": {"type": "string"}, "child_frame_id": {"type": "string"},
-            "translation": numbers(&["x", "y", "z"]), "rotation": numbers(&["x", "y", "z", "w"]),
-        }),
-    )
-}
-
-fn cloud_schema() -> Value {
-    let field = object(
-        json!({"name": {"type": "string"}, "offset": {"type": "integer"}, "type": {"type": "integer"}}),
-    );
-    titled(
-        "foxglove.PointCloud",
-        json!({
-            "timestamp": stamp_schema(), "frame_id": {"type": "string"}, "pose": placed_schema(), "point_stride": {"type": "integer"},
-            "fields": {"type": "array", "items": field}, "data": {"type": "string", "contentEncoding": "base64"},
-        }),
-    )
-}
-
-fn grid_schema() -> Value {
-    let field = object(
-        json!({"name": {"type": "string"}, "offset": {"type": "integer"}, "type": {"type": "integer"}}),
-    );
-    titled(
-        "foxglove.Grid",
-        json!({
-            "timestamp": stamp_schema(), "frame_id": {"type": "string"}, "pose": placed_schema(),
-            "column_count": {"type": "integer"}, "cell_size": numbers(&["x", "y"]),
-            "row_stride": {"type": "integer"}, "cell_stride": {"type": "integer"},
-            "fields": {"type": "array", "items": field}, "data": {"type": "string", "contentEncoding": "base64"},
-        }),
-    )
 }
 
 /// The header of the next message of a file (ns).

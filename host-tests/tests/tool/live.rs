@@ -12,18 +12,24 @@ use serialport::{SerialPort, TTYPort};
 use crate::common::tool::{beamfix, folder, json, text};
 
 /// What a sensor is asked, and answers.
-struct Answers<'a> {
+pub struct Answers<'a> {
     /// A request's bytes, and what the sensor sends for it.
     answers: &'a [(&'a [u8], &'a [u8])],
     /// The request after which it measures; none: it measures from the start.
     scan: Option<&'a [u8]>,
 }
 
+/// A sensor that sends by itself, and hears nothing.
+pub static SILENT: Answers<'static> = Answers {
+    answers: &[],
+    scan: None,
+};
+
 /// What a unit of YDLIDAR's G2 adds to its angles by its own calibration (0.25°).
 const ADDED: i32 = -37;
 
 /// Plays a lidar until nobody listens any more: answers, and sends what it measures at its own pace. Gives the requests.
-fn play(mut line: TTYPort, model: &'static Model, answers: &Answers<'_>) -> Vec<u8> {
+pub fn play(mut line: TTYPort, model: &'static Model, answers: &Answers<'_>) -> Vec<u8> {
     let settings = Settings {
         seconds: 40.0,
         ..Settings::DEFAULT
@@ -108,11 +114,7 @@ fn follow(
 
 #[test]
 fn a_lidar_that_sends_by_itself_is_heard_named_and_followed() {
-    static NONE: Answers<'static> = Answers {
-        answers: &[],
-        scan: None,
-    };
-    let (said, _, lines) = follow(&Model::LDROBOT_LD06, "auto", &NONE);
+    let (said, _, lines) = follow(&Model::LDROBOT_LD06, "auto", &SILENT);
     assert!(lines.contains("ld06 at"), "{lines}");
     assert_eq!(said["scans"], 25);
     assert_eq!(said["refused"], 0, "{said}");

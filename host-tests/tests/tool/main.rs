@@ -4,6 +4,8 @@ mod cli;
 #[path = "../common/mod.rs"]
 mod common;
 mod fields;
+#[cfg(all(feature = "foxglove", unix))]
+mod foxglove;
 mod leave;
 mod live;
 mod places;

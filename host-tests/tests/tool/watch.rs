@@ -95,7 +95,7 @@ fn a_board_is_drawn_and_its_recording_replays_to_the_same_bits() {
 }
 
 /// The bytes of a lidar in a drive of so many seconds, and what a board sends that gets them.
-fn sent_in(seconds: f64) -> (Vec<u8>, Vec<u8>) {
+pub fn sent_in(seconds: f64) -> (Vec<u8>, Vec<u8>) {
     let settings = Settings {
         seconds,
         ..Settings::DEFAULT
