@@ -210,9 +210,14 @@ impl Run {
             Ok(grid)
         })?;
         let mut files = drawn.names();
-        if let Some(grid) = &grid {
-            ros_map::write(grid, &folder.join("seen.yaml"))?;
-            files.push("seen.yaml seen.pgm");
+        match &grid {
+            Some(grid) => {
+                ros_map::write(grid, &folder.join("seen.yaml"))?;
+                files.push("seen.yaml seen.pgm");
+            }
+            None => {
+                remarks.push("seen.yaml: not written: nothing, or more than 200 m of it".into())
+            }
         }
         match recording {
             Recording::Foxglove(mut file) => {

@@ -165,7 +165,7 @@ impl Track {
         map
     }
 
-    /// Ellipses along the path, enlarged until most of them are about so large (m).
+    /// Ellipses along the path, at a scale that makes most of them about so large (m).
     fn ellipses(&self, seen: f64) -> Option<Ellipses> {
         let step = self.shots.len().div_ceil(ELLIPSES).max(1);
         let of = |shot: &Shot| {
@@ -180,21 +180,11 @@ impl Track {
         }
         let sizes: Vec<f64> = chosen.iter().map(|(_, _, size)| *size).collect();
         let wanted = seen / score::quantile(&sizes, 0.5);
-        let scales = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
-        let scale = scales
-            .into_iter()
-            .rev()
-            .find(|scale| *scale <= wanted)
-            .unwrap_or(1.0);
-        let name = if scale > 1.0 {
-            format!("95 % ellipse, {scale} times as large")
-        } else {
-            "95 % ellipse".into()
-        };
-        // One that is larger than the picture says no more than that the robot is lost.
+        let (scale, name) = scaled(wanted);
+        // One that is far larger than most says no more than that the robot is lost.
         let drawn = chosen
             .iter()
-            .filter(|(_, _, size)| scale * size < 20.0 * seen);
+            .filter(|(_, _, size)| scale * size < 10.0 * seen);
         let shape = |(pose, covariance, _): &(Pose, Covariance, f64)| {
             let centre = [f64::from(pose.x), f64::from(pose.y)];
             let corners = ellipse(centre, *covariance, scale);
@@ -316,9 +306,72 @@ impl Track {
     }
 }
 
+/// A round scale for ellipses that should be so many times as large as they are, and what it is called.
+fn scaled(wanted: f64) -> (f64, String) {
+    let scales = [
+        0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0,
+    ];
+    let fits = scales.into_iter().rev().find(|scale| *scale <= wanted);
+    let scale = fits.unwrap_or(scales[0]);
+    let name = if scale > 1.0 {
+        format!("95 % ellipse, {scale} times as large")
+    } else if scale < 1.0 {
+        format!("95 % ellipse, {:.0} times as small", 1.0 / scale)
+    } else {
+        "95 % ellipse".into()
+    };
+    (scale, name)
+}
+
 /// Standard deviation of a position in the direction in which it is largest (m).
 fn sigma(covariance: Covariance) -> f64 {
     let [xx, xy, yy] = [covariance.0.xx, covariance.0.xy, covariance.0.yy].map(f64::from);
     let half = libm::hypot(0.5 * (xx - yy), xy);
     libm::sqrt((0.5 * (xx + yy) + half).max(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use beamfix::scan::{Bearing, Range};
+
+    #[test]
+    fn ellipses_are_drawn_at_a_scale_that_is_told() {
+        for (wanted, scale, name) in [
+            (7.0, 5.0, "95 % ellipse, 5 times as large"),
+            (1.3, 1.0, "95 % ellipse"),
+            (0.3, 0.2, "95 % ellipse, 5 times as small"),
+            (1e-5, 0.01, "95 % ellipse, 100 times as small"),
+        ] {
+            assert_eq!(scaled(wanted), (scale, name.to_owned()));
+        }
+    }
+
+    /// Corrected logs have a robot that moves half a metre in a millisecond.
+    #[test]
+    fn a_log_whose_times_are_wrong_is_drawn_where_it_was_seen() {
+        let beam = |k: u32| Beam {
+            bearing: Bearing(0),
+            range: Range::from_mm(2000),
+            time_us: 1000 * k,
+            quality: 0,
+        };
+        let beams: Vec<Beam> = (0..14).map(beam).collect();
+        let mut track = Track::new(TruePose::default(), Pose::IDENTITY, 1);
+        let at = |time: f64, x: f32| At {
+            time,
+            estimate: Pose::new(x, 0.0, 0.3 * x),
+            covariance: None,
+            is_measured: true,
+            truth: None,
+            wheels: None,
+        };
+        track.push(at(0.0, 0.0), &beams);
+        let points = track.push(at(0.001, 0.5), &beams);
+        // No farther than it moved from where it was seen.
+        for point in points {
+            let off = libm::hypotf(point.x - 2.0, point.y);
+            assert!(off < 0.5 + 2.0 * 0.15 + 1e-3, "{point:?}");
+        }
+    }
 }

@@ -228,7 +228,8 @@ impl PairPicture {
                 [high[0].max(low[0] + 0.01), high[1].max(low[1] + 0.01)],
             )
         } else {
-            bounds(path.iter().copied().chain([xy(self.truth)]))
+            let found = ellipse.iter().flatten().copied();
+            bounds(path.iter().copied().chain([xy(self.truth)]).chain(found))
         };
         let (mut chart, limits) = metres(area, low, high, caption)?;
         // A long jump is another start of the search, not a step.
