@@ -337,7 +337,7 @@ pub fn places(beams: &[Beam], motion: Pose, seconds: f32, robot_from_lidar: Pose
         let (s, c) = beamfix::math::sin_cos(beam.bearing.radians());
         let age = end_us.wrapping_sub(beam.time_us) as f32 * 1e-6;
         // Where a log's times are closer together than a revolution is long, the motion is all that is known.
-        let age = age.min(seconds);
+        let age = if age < seconds { age } else { seconds };
         let end_from_then = twist.displacement(-age);
         Some(end_from_then * (robot_from_lidar * Point::new(range * c, range * s)))
     };

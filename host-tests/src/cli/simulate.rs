@@ -251,18 +251,18 @@ fn map(drive: &Drive) -> Result<ros_map::Map> {
     let (low, high) = drive.world.extent();
     let margin = f64::from(3.0 * CELL);
     let start = drive.moments.first().context("nothing was driven")?.truth;
-    Ok(ros_map::of_world(
+    ros_map::of_world(
         &drive.world,
         low.map(|side| side - margin),
         high.map(|side| side + margin),
         CELL,
         [start.x, start.y],
-    )?)
+    )
 }
 
 /// The likelihood field of the world that was driven through, in its own frame.
 fn field(drive: &Drive) -> Result<LikelihoodField<Vec<u8>>> {
-    Ok(of_map(&map(drive)?, &FieldModel::DEFAULT)?)
+    of_map(&map(drive)?, &FieldModel::DEFAULT)
 }
 
 /// Follows the robot by what its lidar saw; `lost` counts the keyframes that were given up.
