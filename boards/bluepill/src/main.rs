@@ -81,11 +81,7 @@ impl Hardware for Board {
     fn set_lidar_baud(&mut self, baud: u32) {
         let divisor = divisor(self.lidar_clock, baud);
         // SAFETY: nothing else writes this register after the start.
-        unsafe {
-            (*pac::USART2::ptr())
-                .brr()
-                .write(|w| w.bits(divisor))
-        };
+        unsafe { (*pac::USART2::ptr()).brr().write(|w| w.bits(divisor)) };
     }
 
     fn feed_watchdog(&mut self) {
