@@ -46,9 +46,7 @@ impl View {
         let is_seen = self
             .wedge
             .is_some_and(|wedge| wedge.holds(sensor, direction, width));
-        // The wedge lies ahead: where the lidar turns to.
-        let turned = wrap(direction - self.last);
-        self.last = direction;
+        let before = std::mem::replace(&mut self.last, direction);
         if is_seen {
             return &self.part;
         }
@@ -56,6 +54,8 @@ impl View {
         if ahead < 0.0 {
             return world;
         }
+        // The wedge lies ahead: where the lidar turns to.
+        let turned = wrap(direction - before);
         let wedge = Wedge {
             from: [sensor.x, sensor.y],
             direction: direction + ahead.copysign(turned),
@@ -73,9 +73,10 @@ impl View {
 impl Wedge {
     /// Whether a beam stays in it.
     fn holds(&self, sensor: TruePose, direction: f64, width: f64) -> bool {
+        let near = |off: f64| off.abs() + 0.5 * width < HALF - ROUNDING;
         let off = [sensor.x - self.from[0], sensor.y - self.from[1]];
         off[0] * off[0] + off[1] * off[1] < (NEAR - ROUNDING) * (NEAR - ROUNDING)
-            && wrap(direction - self.direction).abs() + 0.5 * width < HALF - ROUNDING
+            && (near(direction - self.direction) || near(wrap(direction - self.direction)))
     }
 
     /// Puts the faces that reach into it, or nearly, into `part`; `false` where there is a mirror, which shows all others.

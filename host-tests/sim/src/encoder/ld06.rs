@@ -127,7 +127,10 @@ impl Sensor {
     /// Clockwise angle, in turns, within [0, 1).
     fn angle(&self, beam: u64) -> f64 {
         let time = self.time_s(beam);
-        let ahead = self.sway * SWAY_S / TAU * (1.0 - libm::cos(TAU * time / SWAY_S));
+        let ahead = match self.sway {
+            0.0 => 0.0,
+            sway => sway * SWAY_S / TAU * (1.0 - libm::cos(TAU * time / SWAY_S)),
+        };
         (self.phase + self.turns_per_s * (time + ahead)).rem_euclid(1.0)
     }
 
