@@ -155,7 +155,10 @@ fuzz_target!(|input: Input| {
                 std::mem::forget(table);
             }
             Call::Mapping { missing } => {
-                memory = Memory::new(BEAMFIX_MAPPING_BYTES - 1000 * usize::from(*missing), 0);
+                memory = Memory::new(
+                    BEAMFIX_MAPPING_BYTES.saturating_sub(1000 * usize::from(*missing)),
+                    0,
+                );
                 object = ptr::null_mut();
                 let (start, bytes) = (memory.start(), memory.bytes);
                 let status =
