@@ -4,6 +4,7 @@
 mod common;
 mod encoders;
 mod faults;
+mod golden;
 mod identify;
 mod noise;
 mod simulated;

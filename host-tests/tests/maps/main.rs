@@ -4,6 +4,7 @@ mod beam_model;
 #[path = "../common/mod.rs"]
 mod common;
 mod fields;
+mod golden;
 mod grid;
 mod localization;
 mod particles;

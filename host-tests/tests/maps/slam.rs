@@ -2,7 +2,7 @@
 
 mod building;
 mod carried;
-mod drive;
+pub mod drive;
 mod nonsense;
 mod recorded;
 mod solver;

@@ -9,6 +9,7 @@ mod degenerate;
 mod every_match;
 mod extremes;
 mod field;
+mod golden;
 mod host_cost;
 mod staged;
 mod staged_search;

@@ -31,7 +31,11 @@ const BEAMS: usize = 360;
 const SEEDS: u64 = 20;
 
 /// A pair of scans in an office and a guess off by up to `metres` and `degrees`: reference, current, motion, guess.
-fn pair(seed: u64, metres: f64, degrees: f64) -> (Vec<ScanPoint>, Vec<ScanPoint>, TruePose, Pose) {
+pub fn pair(
+    seed: u64,
+    metres: f64,
+    degrees: f64,
+) -> (Vec<ScanPoint>, Vec<ScanPoint>, TruePose, Pose) {
     let world = scenes::office(seed);
     let mut noise = Noise::new(seed, 1);
     let place = scenes::office_place(&world, 0.6, &mut noise);

@@ -1,0 +1,303 @@
+//! The bits of fields, localization, particles, presence, sensor models and SLAM, as they are kept.
+
+use super::localization::{drive, place, scan};
+use super::slam::drive::{drive as follow, path};
+use crate::common::{kept::Kept, points_from};
+use beamfix::{
+    geometry::{Point, Pose},
+    grid::{
+        Grid, Shape,
+        cast::{self, Skipping},
+        distance,
+        occupancy::{self, UpdateConfig},
+    },
+    localization::{
+        Localizer, LocalizerConfig,
+        particles::{Motion, ParticleConfig, ParticleFilter, Proposal, Weighting},
+    },
+    matching::{
+        correlative::pyramid::Pyramid,
+        field::{self, FieldConfig},
+        map::{self, Kernel, MapConfig},
+    },
+    scan::Bearing,
+    sensor_model::{
+        BeamModel,
+        beam_model::{BeamTable, learning::Learner},
+        likelihood_field::{
+            Field as _, FieldModel, Profile,
+            draw::{self, DrawConfig},
+            tiles::Tiles,
+        },
+    },
+    slam::{Slam, SlamConfig},
+};
+use beamfix_sim::{home, noise::Noise, pose::TruePose, scenes};
+use host_tests::mapping::building::{ROUND, ring};
+
+#[test]
+fn maps_give_the_bits_that_are_kept() {
+    let mut kept = Kept::of("maps");
+    sensor_models(&mut kept);
+    fields(&mut kept);
+    localization(&mut kept);
+    particles(&mut kept);
+    slam(&mut kept);
+    kept.check();
+}
+
+fn sensor_models(kept: &mut Kept) {
+    let model = BeamModel::DEFAULT;
+    let table = BeamTable::new(&model);
+    let mut learner = Learner::new(model);
+    for step in 1..60u16 {
+        let expected = 200 * step;
+        for range in [
+            None,
+            Some(expected / 2),
+            Some(expected - 10),
+            Some(expected + 40),
+            Some(11_900),
+        ] {
+            let metres = range.map(|mm| f32::from(mm) * 1e-3);
+            kept.push(
+                "beam model",
+                model.likelihood(metres, f32::from(expected) * 1e-3),
+            );
+            kept.push("beam table", table.log_likelihood(range, expected));
+            learner.add(metres, f32::from(expected) * 1e-3);
+        }
+    }
+    kept.push(
+        "learner",
+        (
+            learner.mean_log_likelihood(),
+            learner.beams(),
+            learner.model(),
+        ),
+    );
+    learner.forget(0.3);
+    kept.push("learner forgets", (learner.beams(), learner.model()));
+    let field = FieldModel::DEFAULT;
+    let profile = Profile::new(&field);
+    for step in 0..60u16 {
+        let metres = 0.01 * f32::from(step);
+        kept.push(
+            "field model",
+            (
+                field.log_likelihood(metres),
+                profile.byte(u32::from(step).pow(4)),
+            ),
+        );
+    }
+}
+
+/// Fields drawn from scans, in tiles; matches on them; local maps matched with maps; beams cast.
+fn fields(kept: &mut Kept) {
+    let world = scenes::flat();
+    let profile = Profile::new(&FieldModel::DEFAULT);
+    for seed in 0..6 {
+        let mut noise = Noise::new(seed, 41);
+        let middle = Point::new(4.0, 4.0);
+        let mut tiles =
+            Box::new(Tiles::<420, 1600>::new(0.05, middle, *profile.scale()).expect("a window"));
+        let truth = TruePose::new(
+            noise.even(2.8, 3.3),
+            noise.even(2.5, 2.9),
+            noise.even(-3.0, 3.0),
+        );
+        for _ in 0..2 {
+            let near = truth.then(TruePose::new(
+                noise.even(-0.2, 0.2),
+                0.0,
+                noise.even(-0.5, 0.5),
+            ));
+            let points = points_from(&world, near, 300, &mut noise);
+            draw::scan(
+                &mut *tiles,
+                &points,
+                near.into(),
+                &profile,
+                &DrawConfig::DEFAULT,
+            );
+        }
+        let points = points_from(&world, truth, 360, &mut noise);
+        for off in [0.02, 0.1, 0.3] {
+            let guess = Pose::from(truth) * Pose::new(off, -off, 0.4 * off);
+            kept.push(
+                "field",
+                field::align(&*tiles, &points, guess, &FieldConfig::DEFAULT),
+            );
+        }
+        tiles.roll(Point::new(5.0, 4.5)).expect("a window");
+        let shape = *tiles.shape();
+        let bytes = (0..u32::from(shape.height()))
+            .flat_map(|y| (0..u32::from(shape.width())).map(move |x| (x, y)));
+        kept.push(
+            "tiles",
+            bytes.map(|(x, y)| tiles.byte(x, y)).collect::<Vec<u8>>(),
+        );
+
+        let whole = local_map(&world, truth, &mut noise);
+        let part = local_map(&world, truth.then(TruePose::new(0.2, 0.1, 0.1)), &mut noise);
+        kept.push("occupancy", whole.cells());
+        let (mut smooth, mut finer) = (whole.clone(), part);
+        map::smooth(&mut smooth, Kernel::Five);
+        map::smooth(&mut finer, Kernel::Five);
+        let guess = Pose::new(0.23, 0.05, 0.12);
+        kept.push(
+            "map",
+            map::align(
+                &smooth.as_slice(),
+                &finer.as_slice(),
+                guess,
+                &MapConfig::DEFAULT,
+            ),
+        );
+        let distances = distances(&whole);
+        for k in 0..64u16 {
+            let bearing = Bearing(k * 1021);
+            let from = Pose::new(0.1, 0.2, 0.3);
+            let exact = cast::exact(&whole, from, bearing, 6000, occupancy::is_occupied);
+            kept.push("cast", exact);
+            let skipping = Skipping::new(whole.as_slice(), &distances).expect("as large");
+            kept.push("cast in leaps", skipping.cast(from, bearing, 6000));
+        }
+    }
+    // A corridor is weak along itself.
+    let world = scenes::corridor();
+    let mut noise = Noise::new(1, 42);
+    let at = TruePose::new(0.0, 0.1, 0.4);
+    let points = points_from(&world, at, 360, &mut noise);
+    let field = crate::common::field_of(&points, 0.05, &FieldModel::DEFAULT);
+    let guess = Pose::new(0.05, -0.03, 0.02);
+    kept.push(
+        "field, corridor",
+        field::align(&field.as_slice(), &points, guess, &FieldConfig::DEFAULT),
+    );
+}
+
+/// From each cell to the nearest occupied one, in cells.
+fn distances(grid: &Grid<Vec<u8>>) -> Vec<u8> {
+    let shape = grid.shape();
+    let (mut squares, mut roots) = (vec![0; shape.len()], vec![0; shape.len()]);
+    let mut scratch = Box::new(distance::Scratch::<160>::new());
+    let occupied = occupancy::is_occupied;
+    distance::squared(shape, grid.cells(), occupied, &mut squares, &mut scratch).expect("room");
+    distance::roots(&squares, &mut roots);
+    roots
+}
+
+/// Five scans along a short way, in the frame of `pose`.
+fn local_map(world: &beamfix_sim::World, pose: TruePose, noise: &mut Noise) -> Grid<Vec<u8>> {
+    let shape = Shape::new(160, 160, 0.05, Pose::new(-4.0, -4.0, 0.0)).expect("good");
+    let mut local = Grid::new(shape, vec![occupancy::UNKNOWN; shape.len()]).expect("fits");
+    for step in 0..5 {
+        let way = TruePose::new(0.05 * f64::from(step), 0.0, 0.05 * f64::from(step));
+        let points = points_from(world, pose.then(way), 300, noise);
+        occupancy::update(&mut local, way.into(), &points, &UpdateConfig::DEFAULT);
+    }
+    occupancy::decide(local.cells_mut());
+    local
+}
+
+/// Two robots that start without a pose, drive, and are carried elsewhere.
+fn localization(kept: &mut Kept) {
+    let place = place();
+    let mut buffer = vec![0; Pyramid::bytes(place.field.grid().shape())];
+    let pyramid = Pyramid::new(place.field.as_slice(), &mut buffer).expect("fits");
+    for seed in 0..2 {
+        let mut noise = Noise::new(seed, 43);
+        let mut robot = Localizer::<96>::new(pyramid, LocalizerConfig::DEFAULT);
+        let mut wheels = Pose::IDENTITY;
+        for _ in 0..2 {
+            let mut pose = home::home_place(&place.world, &place.map, 0.25, &mut noise);
+            for _ in 0..6 {
+                let points = scan(&place.world, pose, &mut noise);
+                kept.push("localization", robot.update(&points, wheels));
+                let mut steps = 0;
+                while !robot.step(200_000) {
+                    steps += 1;
+                }
+                kept.push(
+                    "localization, steps",
+                    (steps, robot.counters(), robot.pose()),
+                );
+                (pose, wheels) = drive(&place, pose, &mut noise);
+            }
+        }
+    }
+}
+
+fn particles(kept: &mut Kept) {
+    let place = place();
+    let table = BeamTable::new(&BeamModel::DEFAULT);
+    for (name, weighting, proposal, particles) in [
+        (
+            "particles, wheels",
+            Weighting::LikelihoodField,
+            Proposal::Motion,
+            120,
+        ),
+        (
+            "particles, match",
+            Weighting::LikelihoodField,
+            Proposal::Improved,
+            8,
+        ),
+        (
+            "particles, beam model",
+            Weighting::BeamModel(&table),
+            Proposal::Improved,
+            8,
+        ),
+    ] {
+        let mut noise = Noise::new(7, 44);
+        let mut pose = home::home_place(&place.world, &place.map, 0.25, &mut noise);
+        let config = ParticleConfig {
+            proposal,
+            particles,
+            seed: 5,
+            ..ParticleConfig::DEFAULT
+        };
+        let mut filter = ParticleFilter::<'_, 2000, 96>::new(place.field.as_slice(), config)
+            .weighed_by(weighting);
+        filter.start_at(pose.into(), (0.05, 0.05));
+        for turn in 0..24 {
+            let wheels;
+            (pose, wheels) = drive(&place, pose, &mut noise);
+            if turn == 16 {
+                pose = home::home_place(&place.world, &place.map, 0.25, &mut noise);
+            }
+            filter.moved(&Motion::by_wheels(wheels, 0.1));
+            kept.push(name, filter.update(&scan(&place.world, pose, &mut noise)));
+            kept.push(name, filter.counts());
+        }
+        kept.push(name, filter.particles().collect::<Vec<_>>());
+    }
+}
+
+/// A round and a half about a building with a memory that is too small for it.
+fn slam(kept: &mut Kept) {
+    let truth = path(&ROUND, 2);
+    let mut slam = Box::new(Slam::<48, 96, 400, 144, 360>::new(SlamConfig::DEFAULT));
+    let driven = follow(&mut slam, &ring(), &truth[..truth.len() * 3 / 4], 0.002, 3);
+    kept.push("slam, poses", &driven.mapped);
+    kept.push("slam, in map", (&driven.in_map, &driven.located));
+    kept.push("slam, counters", slam.counters());
+    kept.push("slam, graph", slam.graph().edges());
+    kept.push("slam, keyframes", slam.keyframes().collect::<Vec<_>>());
+    let extent = slam.extent(8.0);
+    kept.push("slam, extent", extent);
+    let shape = Shape::new(300, 300, 0.1, Pose::new(-5.0, -5.0, 0.0)).expect("good");
+    let mut grid = Grid::new(shape, vec![occupancy::UNKNOWN; shape.len()]).expect("fits");
+    for (slot, ..) in slam
+        .graph()
+        .nodes()
+        .map(|(slot, node)| (slot, node.pose))
+        .collect::<Vec<_>>()
+    {
+        slam.draw(slot, &mut grid, &UpdateConfig::DEFAULT);
+    }
+    kept.push("slam, map", grid.cells());
+}
