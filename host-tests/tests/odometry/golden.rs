@@ -2,7 +2,10 @@
 //!
 //! The emulated boards are compared by `beamfix verify`.
 
+use crate::common::kept::Kept;
+use beamfix_sim::catalogue;
 use host_tests::golden;
+use host_tests::report::scene::{self, Runs};
 
 #[test]
 fn every_pose_has_the_bits_that_are_kept() {
@@ -19,4 +22,50 @@ fn every_pose_has_the_bits_that_are_kept() {
             run.name
         );
     }
+}
+
+/// Scenes of every kind: what steps of them hold, with covariances and refusals.
+const SCENES: [&str; 20] = [
+    "flat-no-wheels",
+    "yard",
+    "corridor-no-wheels",
+    "wheels-start-over-often",
+    "wheels-jitter-100-ms",
+    "wheels-7-hz",
+    "wheels-slip",
+    "corridor-person-ahead",
+    "own-mast-no-wheels",
+    "crowd-one-way",
+    "carried-far-under-a-cover",
+    "covered-3-s-no-wheels",
+    "outliers-30-percent-no-wheels",
+    "beams-64",
+    "drive-1-cm-and-2-percent",
+    "lds-01",
+    "turns-360-deg-per-s-no-wheels",
+    "square-room-after-a-gap",
+    "beams-by-bearing",
+    "sick-0.5-deg-interleaved",
+];
+
+#[test]
+fn every_step_of_the_scenes_has_the_bits_that_are_kept() {
+    let mut kept = Kept::of("scenes");
+    for name in SCENES {
+        let all = catalogue::all();
+        let entry = all.iter().find(|entry| entry.name == name);
+        let entry = entry.unwrap_or_else(|| panic!("no scene {name}"));
+        let push = |_, step: &_, _| kept.push(name, step);
+        scene::run(entry, (1, Runs::Odometry), |config| config, push);
+    }
+    let all = catalogue::all();
+    let entry = all.iter().find(|entry| entry.name == "hall");
+    let push = |_, step: &_, _| kept.push("hall, on a rolling map", step);
+    scene::run(
+        entry.expect("a hall"),
+        (1, Runs::Rolling),
+        |config| config,
+        push,
+    );
+    kept.check();
 }

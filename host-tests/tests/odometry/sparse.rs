@@ -1,5 +1,6 @@
 //! A ring of multi-zone rangers through the flat: its last scans together find the way.
 
+use crate::common::kept::Kept;
 use beamfix::geometry::Pose;
 use beamfix::math::wrap_angle;
 use beamfix::odometry::Step;
@@ -25,6 +26,10 @@ struct Outcome {
 }
 
 fn minute(model: RingModel, seed: u64) -> Outcome {
+    drive_and(model, seed, |_| ())
+}
+
+fn drive_and(model: RingModel, seed: u64, mut observe: impl FnMut(&Step)) -> Outcome {
     let settings = Settings {
         seed,
         seconds: 60.0,
@@ -49,6 +54,7 @@ fn minute(model: RingModel, seed: u64) -> Outcome {
             step = Some(*revolution.step);
         });
         let step = step.expect("a scan gives a step");
+        observe(&step);
         let truth: Pose = origin.truth.between(now.truth).into();
         let error = score::error(step.pose, truth);
         outcome.last = error;
@@ -154,4 +160,11 @@ fn other_drives_of_a_whole_ring_and_of_half_a_ring() {
         );
         assert!(outcomes.iter().all(|o| o.last.1 < 0.5 * o.wheels.1));
     }
+}
+
+#[test]
+fn every_step_of_a_ring_has_the_bits_that_are_kept() {
+    let mut kept = Kept::of("ring");
+    drive_and(RingModel::VL53L5CX, 3, |step| kept.push("64 beams", step));
+    kept.check();
 }
