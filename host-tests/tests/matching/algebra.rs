@@ -10,6 +10,7 @@ use beamfix::{
     scan::{Bearing, ScanPoint},
 };
 use beamfix_sim::{TruePose, noise::Noise, scenes};
+use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 
 use crate::common::points_from;
@@ -80,6 +81,78 @@ proptest! {
         for (a, b) in [(back.xx, c.0.xx), (back.xy, c.0.xy), (back.yy, c.0.yy), (back.xt, c.0.xt), (back.yt, c.0.yt), (back.tt, c.0.tt)] {
             prop_assert!((a - b).abs() < 1e-5 * largest * reach * reach, "{a} {b}");
         }
+    }
+}
+
+/// The same matrix in doubles, in another's hands.
+fn twin(m: &Sym3) -> Matrix3<f64> {
+    let [xx, xy, xt, yy, yt, tt] = [m.xx, m.xy, m.xt, m.yy, m.yt, m.tt].map(f64::from);
+    Matrix3::new(xx, xy, xt, xy, yy, yt, xt, yt, tt)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Everything that a symmetric matrix is asked for, beside nalgebra in doubles: to what 24 bits leave of it.
+    #[test]
+    fn a_symmetric_matrix_is_nalgebras(a in covariance(), b in covariance(), v in prop::array::uniform3(-3.0..3.0f32), x in -5.0..5.0f32, y in -5.0..5.0f32) {
+        let (ours, other, vector) = (a.0, b.0, Vector3::from(v.map(f64::from)));
+        let (m, n) = (twin(&ours), twin(&other));
+        let (x64, y64) = (f64::from(x), f64::from(y));
+        // A turn about (x, y) is one about the origin and a shift by (y, -x).
+        let shift = Matrix3::new(1.0, 0.0, y64, 0.0, 1.0, -x64, 0.0, 0.0, 1.0);
+        let stretch = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, x64));
+        let near = |what: &str, got: &Sym3, want: Matrix3<f64>, digits: f64| {
+            let off = (twin(got) - want).abs().max();
+            prop_assert!(off <= digits * want.abs().max(), "{what}: {got:?} for {want}");
+            Ok(())
+        };
+        near("plus", &ours.plus(&other), m + n, 1e-6)?;
+        near("scaled", &ours.scaled(x), m * x64, 1e-6)?;
+        near("theta_scaled", &ours.theta_scaled(x), stretch * m * stretch, 1e-6)?;
+        near("about", &ours.about(x, y), shift.transpose() * m * shift, 1e-5)?;
+        near("congruent", &ours.congruent(&other), n * m * n, 1e-5)?;
+        near("outer", &Sym3::outer(v), vector * vector.transpose(), 1e-6)?;
+        let product = m * vector;
+        let times = Vector3::from(ours.times(v).map(f64::from));
+        let reach = m.abs().max() * vector.abs().max();
+        prop_assert!((times - product).abs().max() <= 1e-6 * reach, "{times} for {product}");
+        let quadratic = f64::from(ours.quadratic(v));
+        prop_assert!((quadratic - vector.dot(&product)).abs() <= 1e-5 * reach * vector.abs().max());
+
+        let values = m.symmetric_eigenvalues();
+        let (least, largest) = (values.min(), values.max());
+        let lost = 1e-6 * largest / least;
+        near("inverse", &ours.inverse().expect("positive definite"), m.try_inverse().expect("regular"), 3.0 * lost)?;
+        let solved = Vector3::from(ours.solve(v).expect("positive definite").map(f64::from));
+        prop_assert!((m * solved - vector).abs().max() <= 10.0 * lost * vector.abs().max() + 1e-6, "{solved}");
+        let root = ours.root().expect("positive definite");
+        let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+            .map(|axis| Vector3::from(root.times(axis).map(f64::from)));
+        let root_twin = Matrix3::from_columns(&columns);
+        let off = (root_twin * root_twin.transpose() - m).abs().max();
+        prop_assert!(off <= 3e-6 * m.abs().max(), "a root of {m}: {root_twin}");
+        let determinant = f64::from(root.determinant());
+        prop_assert!((determinant.powi(2) / m.determinant() - 1.0).abs() <= 10.0 * lost);
+        let mut sorted = [values[0], values[1], values[2]];
+        sorted.sort_by(f64::total_cmp);
+        for ((value, vector), want) in ours.eigen().into_iter().zip(sorted) {
+            let vector = Vector3::from(vector.map(f64::from));
+            prop_assert!((f64::from(value) - want).abs() <= 3e-6 * largest, "{value} for {want}");
+            prop_assert!((vector.norm() - 1.0).abs() <= 1e-5);
+            prop_assert!((m * vector - vector * f64::from(value)).norm() <= 1e-5 * largest);
+        }
+    }
+
+    /// What is not positive definite has no inverse, no root and no solution.
+    #[test]
+    fn what_is_not_positive_definite_is_refused(a in covariance(), v in prop::array::uniform3(-1.0..1.0f32)) {
+        // So much less in one direction that it is negative there.
+        let length: f32 = v.iter().map(|x| x * x).sum();
+        prop_assume!(length > 0.01);
+        let [_, _, (largest, _)] = a.0.eigen();
+        let ours = a.0.plus(&Sym3::outer(v).scaled(-1.1 * largest / length));
+        prop_assert!(ours.inverse().is_none() && ours.root().is_none() && ours.solve(v).is_none());
     }
 }
 

@@ -7,6 +7,7 @@ mod converged;
 mod correlative;
 mod degenerate;
 mod every_match;
+mod exhaustive;
 mod extremes;
 mod field;
 mod golden;
