@@ -9,10 +9,10 @@
 //! - `projective` is the product: one fixed mixture of stages in integers, about 0.4 million instructions a match, with
 //!   several starts for bad guesses. It pairs by *projection*: both scans come from the same lidar, so the surface in a
 //!   point's direction is found in a table, without a search.
-//! - [`modular`] is the textbook: every stage a type to choose, in `f32`. Take it to compare, to teach, or where a scene
+//! - `modular` (feature `modular`) is the textbook: every stage a type to choose, in `f32`. Take it to compare, to teach, or where a scene
 //!   wants a stage that the fast one lacks.
 //!
-//! The second is the first one's specification: [`modular::Stages::projective`] are the choices that the first has built in,
+//! The second is the first one's specification: `modular::Stages::projective` are the choices that the first has built in,
 //! and a test (`host-tests/tests/matching/staged.rs`) holds the two together. They share the judge of degenerate directions
 //! and covariances, the question which beams lie on one surface, and [`Match`](super::Match).
 

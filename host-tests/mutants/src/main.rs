@@ -1,6 +1,6 @@
 //! Breaks the library on purpose, a place at a time, and looks which tests notice.
 //!
-//! `cargo run --release --manifest-path host-tests/mutants/Cargo.toml -- --sample 400 --seed 1` copies the project to
+//! `cargo run --release -p beamfix-mutants -- --sample 400 --seed 1` copies the project to
 //! `target/mutants/tree`, builds its tests once with all chosen breaks in them, looks which test runs through which break, and then runs
 //! these tests with one break on, the quickest first, until one fails. What no test notices stands in the table at the end.
 

@@ -351,3 +351,35 @@ fn values(output: &ReturnType) -> Vec<proc_macro2::TokenStream> {
         _ => vec![],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "
+        const FIXED: u32 = 1 + 2;
+        const fn also_fixed(a: u32) -> u32 { a + 1 }
+        fn least(a: u32, b: u32) -> u32 { if a < b && a != 7 { a - 1 } else { b } }
+        #[cfg(test)] mod tests { fn none(a: u32) -> u32 { a + 1 } }
+    ";
+
+    /// The places in `TEXT`: two for `<`, one each for `&&` and `!=`, two for `-`, two for the whole.
+    #[test]
+    fn places_are_found_where_a_break_can_be_asked_for() {
+        let mut walk = Walk::new("a.rs", 1, None);
+        walk.visit_file_mut(&mut syn::parse_file(TEXT).expect("a file"));
+        assert_eq!(walk.found.len(), 8, "{:?}", walk.found);
+        assert!(walk.found.iter().all(|mutant| mutant.function == "least" && mutant.line == 4));
+    }
+
+    #[test]
+    fn what_is_chosen_stands_in_the_text() {
+        let mut file = syn::parse_file(TEXT).expect("a file");
+        let chosen = BTreeSet::from([3, 5]);
+        Walk::new("a.rs", 1, Some(&chosen)).visit_file_mut(&mut file);
+        let text = prettyplease::unparse(&file);
+        assert_eq!(text.matches("mutant::on").count(), 2, "{text}");
+        assert!(text.contains("mutant::on(3u32)") && text.contains("mutant::on(5u32)"), "{text}");
+        syn::parse_file(&text).expect("a file again");
+    }
+}

@@ -3,8 +3,8 @@
 //! `image`, `resolution` (m), `origin` (`[x, y, yaw]` of the lower left corner), `negate`, `occupied_thresh`,
 //! `free_thresh`, and `mode`: `trinary` (the default), `scale` or `raw`. The picture's first row is the map's last.
 
-mod header;
-mod picture;
+pub mod header;
+pub mod picture;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -4,6 +4,7 @@
 pub mod bag;
 pub mod cable;
 pub mod figures;
+pub mod files;
 pub mod kept;
 pub mod tool;
 

@@ -1,6 +1,7 @@
 //! The bits of fields, localization, particles, presence, sensor models and SLAM, as they are kept.
 
 use super::localization::{drive, place, scan};
+use super::presence as presence_of;
 use super::slam::drive::{drive as follow, path};
 use crate::common::{kept::Kept, points_from};
 use beamfix::{
@@ -14,9 +15,10 @@ use beamfix::{
     localization::{
         Localizer, LocalizerConfig,
         particles::{Motion, ParticleConfig, ParticleFilter, Proposal, Weighting},
+        presence::{self, PresenceConfig},
     },
     matching::{
-        correlative::pyramid::Pyramid,
+        correlative::{Correlator, pyramid::Pyramid},
         field::{self, FieldConfig},
         map::{self, Kernel, MapConfig},
     },
@@ -42,6 +44,7 @@ fn maps_give_the_bits_that_are_kept() {
     fields(&mut kept);
     localization(&mut kept);
     particles(&mut kept);
+    presence(&mut kept);
     slam(&mut kept);
     kept.check();
 }
@@ -274,6 +277,37 @@ fn particles(kept: &mut Kept) {
             kept.push(name, filter.counts());
         }
         kept.push(name, filter.particles().collect::<Vec<_>>());
+    }
+}
+
+/// A dock in front of the lidar, and guesses where none is.
+fn presence(kept: &mut Kept) {
+    let field = presence_of::field();
+    let mut buffer = vec![0; Pyramid::bytes(field.grid().shape())];
+    let pyramid = Pyramid::new(field.as_slice(), &mut buffer).expect("fits");
+    let mut correlator = Correlator::<120>::new();
+    for seed in 0..12 {
+        let mut noise = Noise::new(seed, 45);
+        let mut world = home::home();
+        let at = TruePose::new(2.0, 2.0, noise.even(-3.0, 3.0));
+        let truth = TruePose::new(1.2, noise.even(-0.3, 0.3), 2.9 + noise.even(-0.2, 0.2));
+        presence_of::dock(&mut world, at.then(truth));
+        let points = points_from(&world, at, 450, &mut noise);
+        let [x, y, turn] = [0.2, 0.2, 0.15].map(|most| noise.even(-most, most));
+        for guess in [
+            truth.then(TruePose::new(x, y, turn)),
+            TruePose::new(-1.0, 0.5, 1.0),
+        ] {
+            let found = presence::find(
+                &mut correlator,
+                &pyramid,
+                &presence_of::faces(),
+                &points,
+                guess.into(),
+                &PresenceConfig::DEFAULT,
+            );
+            kept.push("presence", found);
+        }
     }
 }
 

@@ -21,7 +21,7 @@ const FRONT: [[f64; 2]; 6] = [
     [0.0, 0.35],
 ];
 
-fn dock(world: &mut World, at: TruePose) {
+pub fn dock(world: &mut World, at: TruePose) {
     let place = |p: [f64; 2]| {
         let q = at.then(TruePose::new(p[0], p[1], 0.0));
         [q.x, q.y]
@@ -35,7 +35,7 @@ fn dock(world: &mut World, at: TruePose) {
 }
 
 /// Its field, all cells explored: 1.1 m by 0.6 m in cells of 2 cm.
-fn field() -> LikelihoodField<Vec<u8>> {
+pub fn field() -> LikelihoodField<Vec<u8>> {
     let mut world = World::default();
     dock(&mut world, TruePose::default());
     let shape = Shape::new(30, 55, 0.02, Pose::new(-0.35, -0.55, 0.0)).expect("good");
@@ -68,7 +68,7 @@ fn lowered(field: LikelihoodField<Vec<u8>>, x: i32, y: i32) -> LikelihoodField<V
     LikelihoodField::new(Grid::new(shape, cells).expect("fits"), scale).expect("small")
 }
 
-fn faces() -> Vec<Point> {
+pub fn faces() -> Vec<Point> {
     FRONT
         .windows(2)
         .flat_map(|pair| {

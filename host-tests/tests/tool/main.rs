@@ -3,6 +3,7 @@
 mod cli;
 #[path = "../common/mod.rs"]
 mod common;
+mod damaged;
 mod fields;
 #[cfg(all(feature = "foxglove", unix))]
 mod foxglove;
