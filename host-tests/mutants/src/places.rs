@@ -369,7 +369,11 @@ mod tests {
         let mut walk = Walk::new("a.rs", 1, None);
         walk.visit_file_mut(&mut syn::parse_file(TEXT).expect("a file"));
         assert_eq!(walk.found.len(), 8, "{:?}", walk.found);
-        assert!(walk.found.iter().all(|mutant| mutant.function == "least" && mutant.line == 4));
+        assert!(
+            walk.found
+                .iter()
+                .all(|mutant| mutant.function == "least" && mutant.line == 4)
+        );
     }
 
     #[test]
@@ -379,7 +383,10 @@ mod tests {
         Walk::new("a.rs", 1, Some(&chosen)).visit_file_mut(&mut file);
         let text = prettyplease::unparse(&file);
         assert_eq!(text.matches("mutant::on").count(), 2, "{text}");
-        assert!(text.contains("mutant::on(3u32)") && text.contains("mutant::on(5u32)"), "{text}");
+        assert!(
+            text.contains("mutant::on(3u32)") && text.contains("mutant::on(5u32)"),
+            "{text}"
+        );
         syn::parse_file(&text).expect("a file again");
     }
 }
