@@ -38,18 +38,8 @@ use beamfix_sim::{home, noise::Noise, pose::TruePose, scenes};
 use host_tests::mapping::building::{ROUND, ring};
 
 #[test]
-fn maps_give_the_bits_that_are_kept() {
-    let mut kept = Kept::of("maps");
-    sensor_models(&mut kept);
-    fields(&mut kept);
-    localization(&mut kept);
-    particles(&mut kept);
-    presence(&mut kept);
-    slam(&mut kept);
-    kept.check();
-}
-
-fn sensor_models(kept: &mut Kept) {
+fn sensor_models_give_the_bits_that_are_kept() {
+    let mut kept = Kept::of("sensor models");
     let model = BeamModel::DEFAULT;
     let table = BeamTable::new(&model);
     let mut learner = Learner::new(model);
@@ -93,10 +83,13 @@ fn sensor_models(kept: &mut Kept) {
             ),
         );
     }
+    kept.check();
 }
 
 /// Fields drawn from scans, in tiles; matches on them; local maps matched with maps; beams cast.
-fn fields(kept: &mut Kept) {
+#[test]
+fn fields_give_the_bits_that_are_kept() {
+    let mut kept = Kept::of("fields");
     let world = scenes::flat();
     let profile = Profile::new(&FieldModel::DEFAULT);
     for seed in 0..6 {
@@ -178,6 +171,7 @@ fn fields(kept: &mut Kept) {
         "field, corridor",
         field::align(&field.as_slice(), &points, guess, &FieldConfig::DEFAULT),
     );
+    kept.check();
 }
 
 /// From each cell to the nearest occupied one, in cells.
@@ -205,7 +199,9 @@ fn local_map(world: &beamfix_sim::World, pose: TruePose, noise: &mut Noise) -> G
 }
 
 /// Two robots that start without a pose, drive, and are carried elsewhere.
-fn localization(kept: &mut Kept) {
+#[test]
+fn localization_gives_the_bits_that_are_kept() {
+    let mut kept = Kept::of("localization");
     let place = place();
     let mut buffer = vec![0; Pyramid::bytes(place.field.grid().shape())];
     let pyramid = Pyramid::new(place.field.as_slice(), &mut buffer).expect("fits");
@@ -217,39 +213,29 @@ fn localization(kept: &mut Kept) {
             let mut pose = home::home_place(&place.world, &place.map, 0.25, &mut noise);
             for _ in 0..6 {
                 let points = scan(&place.world, pose, &mut noise);
-                kept.push("localization", robot.update(&points, wheels));
+                kept.push("verdicts", robot.update(&points, wheels));
                 let mut steps = 0;
                 while !robot.step(200_000) {
                     steps += 1;
                 }
-                kept.push(
-                    "localization, steps",
-                    (steps, robot.counters(), robot.pose()),
-                );
+                kept.push("counters", (steps, robot.counters(), robot.pose()));
                 (pose, wheels) = drive(&place, pose, &mut noise);
             }
         }
     }
+    kept.check();
 }
 
-fn particles(kept: &mut Kept) {
+#[test]
+fn particles_give_the_bits_that_are_kept() {
+    let mut kept = Kept::of("particles");
     let place = place();
     let table = BeamTable::new(&BeamModel::DEFAULT);
     for (name, weighting, proposal, particles) in [
+        ("wheels", Weighting::LikelihoodField, Proposal::Motion, 120),
+        ("match", Weighting::LikelihoodField, Proposal::Improved, 8),
         (
-            "particles, wheels",
-            Weighting::LikelihoodField,
-            Proposal::Motion,
-            120,
-        ),
-        (
-            "particles, match",
-            Weighting::LikelihoodField,
-            Proposal::Improved,
-            8,
-        ),
-        (
-            "particles, beam model",
+            "beam model",
             Weighting::BeamModel(&table),
             Proposal::Improved,
             8,
@@ -278,10 +264,13 @@ fn particles(kept: &mut Kept) {
         }
         kept.push(name, filter.particles().collect::<Vec<_>>());
     }
+    kept.check();
 }
 
 /// A dock in front of the lidar, and guesses where none is.
-fn presence(kept: &mut Kept) {
+#[test]
+fn presence_gives_the_bits_that_are_kept() {
+    let mut kept = Kept::of("presence");
     let field = presence_of::field();
     let mut buffer = vec![0; Pyramid::bytes(field.grid().shape())];
     let pyramid = Pyramid::new(field.as_slice(), &mut buffer).expect("fits");
@@ -309,20 +298,23 @@ fn presence(kept: &mut Kept) {
             kept.push("presence", found);
         }
     }
+    kept.check();
 }
 
 /// A round and a half about a building with a memory that is too small for it.
-fn slam(kept: &mut Kept) {
+#[test]
+fn slam_gives_the_bits_that_are_kept() {
+    let mut kept = Kept::of("slam");
     let truth = path(&ROUND, 2);
     let mut slam = Box::new(Slam::<48, 96, 400, 144, 360>::new(SlamConfig::DEFAULT));
     let driven = follow(&mut slam, &ring(), &truth[..truth.len() * 3 / 4], 0.002, 3);
-    kept.push("slam, poses", &driven.mapped);
-    kept.push("slam, in map", (&driven.in_map, &driven.located));
-    kept.push("slam, counters", slam.counters());
-    kept.push("slam, graph", slam.graph().edges());
-    kept.push("slam, keyframes", slam.keyframes().collect::<Vec<_>>());
+    kept.push("poses", &driven.mapped);
+    kept.push("in map", (&driven.in_map, &driven.located));
+    kept.push("counters", slam.counters());
+    kept.push("graph", slam.graph().edges());
+    kept.push("keyframes", slam.keyframes().collect::<Vec<_>>());
     let extent = slam.extent(8.0);
-    kept.push("slam, extent", extent);
+    kept.push("extent", extent);
     let shape = Shape::new(300, 300, 0.1, Pose::new(-5.0, -5.0, 0.0)).expect("good");
     let mut grid = Grid::new(shape, vec![occupancy::UNKNOWN; shape.len()]).expect("fits");
     for (slot, ..) in slam
@@ -333,5 +325,6 @@ fn slam(kept: &mut Kept) {
     {
         slam.draw(slot, &mut grid, &UpdateConfig::DEFAULT);
     }
-    kept.push("slam, map", grid.cells());
+    kept.push("map", grid.cells());
+    kept.check();
 }
