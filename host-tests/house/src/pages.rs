@@ -48,16 +48,26 @@ fn every_file_that_a_page_names_exists() {
     assert!(missing.is_empty(), "not there:\n{}", missing.join("\n"));
 }
 
-/// A promise's row names a file of tests and functions in it: `file.rs` `one`, `another`.
+/// A row of a promise or a fault names a file of tests and functions in it: `file.rs` `one`, `another`. Or scenes of the table.
 #[test]
 fn every_promise_has_its_test() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let page = fs::read_to_string(root.join("docs/promises.md")).expect("the page of promises");
+    let read = |page: &str| fs::read_to_string(root.join(page)).expect("a page of promises");
+    let page = read("docs/promises.md") + &read("docs/faults.md");
+    let scenes: String = ["motion", "noise", "people", "wheels"]
+        .map(|kind| read(&format!("host-tests/sim/src/catalogue/{kind}.rs")))
+        .concat();
     let (mut missing, mut named) = (Vec::new(), 0);
     for row in page.lines().filter(|line| line.starts_with('|')) {
         let mut text = String::new();
+        let is_of_scenes = row.contains("| scene");
         for word in row.split('`').skip(1).step_by(2) {
-            if word.ends_with(".rs") {
+            if is_of_scenes {
+                named += 1;
+                if !scenes.contains(&format!("\"{word}\"")) {
+                    missing.push(word.to_owned());
+                }
+            } else if word.ends_with(".rs") {
                 text = fs::read_to_string(root.join(word)).unwrap_or_default();
             } else if !text.is_empty() && !word.contains([' ', '#', '!', '-', '/']) {
                 named += 1;
@@ -67,6 +77,6 @@ fn every_promise_has_its_test() {
             }
         }
     }
-    assert!(named > 20, "the test finds names: {named}");
+    assert!(named > 60, "the test finds names: {named}");
     assert!(missing.is_empty(), "no such tests: {}", missing.join(", "));
 }

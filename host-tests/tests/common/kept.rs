@@ -1,6 +1,6 @@
 //! Results whose every bit is kept: a line of `golden/rooms.txt` for each, its name and a hash of how it prints.
 //!
-//! How a number prints (`{:?}`) tells all its bits. Where a change is meant, `BLESS=1 cargo test --release -p host-tests golden`
+//! How a number prints (`{:?}`) tells all its bits. Where a change is meant, `UPDATE_EXPECT=1 cargo test --release -p host-tests kept`
 //! writes the file, and the commit says what the change did to accuracy and cost.
 
 use std::collections::BTreeMap;
@@ -45,7 +45,7 @@ impl Kept {
             .iter()
             .map(|(name, (hash, count))| format!("{}/{name} {count} {:016x}", self.room, hash.0))
             .collect();
-        if std::env::var_os("BLESS").is_some() {
+        if std::env::var_os("UPDATE_EXPECT").is_some() {
             let others = kept.lines().filter(|line| !mine(line)).map(str::to_owned);
             let mut all: Vec<String> = others.chain(now).collect();
             all.sort();
@@ -59,7 +59,7 @@ impl Kept {
             .collect();
         assert!(
             changed.is_empty() && now.len() == kept.len(),
-            "not the bits that are kept: {changed:?}; if that is meant, BLESS=1"
+            "not the bits that are kept: {changed:?}; if that is meant, UPDATE_EXPECT=1"
         );
     }
 }
