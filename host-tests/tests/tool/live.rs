@@ -39,8 +39,16 @@ pub fn play(mut line: TTYPort, model: &'static Model, answers: &Answers<'_>) -> 
     let (mut asked, mut answered) = (Vec::new(), 0);
     let mut began = answers.scan.is_none().then(Instant::now);
     let (mut sent, mut frame) = (0, 0);
+    // What is to be sent, and how much of it is on the line: a full line takes the rest later.
+    let (mut out, mut written) = (Vec::new(), 0);
     let start = Instant::now();
     while start.elapsed() < Duration::from_secs(60) {
+        match line.write(&out[written..]) {
+            Ok(count) => written += count,
+            Err(error) if error.kind() == ErrorKind::TimedOut => {}
+            // Whoever listened has closed the line.
+            Err(_) => break,
+        }
         let mut bytes = [0; 256];
         match line.read(&mut bytes) {
             Ok(n) => asked.extend_from_slice(&bytes[..n]),
@@ -51,7 +59,7 @@ pub fn play(mut line: TTYPort, model: &'static Model, answers: &Answers<'_>) -> 
         for (request, answer) in answers.answers {
             if asked[answered..].ends_with(request) {
                 answered = asked.len();
-                line.write_all(answer).expect("somebody listens");
+                out.extend_from_slice(answer);
             }
         }
         if answers.scan.is_some_and(|scan| asked.ends_with(scan)) {
@@ -59,9 +67,7 @@ pub fn play(mut line: TTYPort, model: &'static Model, answers: &Answers<'_>) -> 
         }
         let now_us = began.map_or(0.0, |began| began.elapsed().as_secs_f64() * 1e6);
         while let Some(&(end, _)) = measured.frames.get(frame).filter(|next| next.1 < now_us) {
-            if line.write_all(&measured.bytes[sent..end]).is_err() {
-                return asked;
-            }
+            out.extend_from_slice(&measured.bytes[sent..end]);
             (sent, frame) = (end, frame + 1);
         }
     }
