@@ -196,6 +196,31 @@ mod tests {
     }
 
     #[test]
+    fn lengths_end_at_the_ends_of_their_numbers() {
+        for (metres, mm) in [
+            (-0.1, 0),
+            (-1e9, 0),
+            (0.0, 0),
+            (f32::NAN, 0),
+            (0.0126, 13),
+            (65.535, 65_535),
+            (1e9, 65_535),
+        ] {
+            assert_eq!(to_mm(metres), mm, "{metres}");
+        }
+    }
+
+    #[test]
+    fn weights_fall_to_nothing() {
+        let weights = [0.0, -0.5, -3.0, -20.0, -79.0].map(weight_exp);
+        assert!(weights.is_sorted_by(|a, b| a > b), "{weights:?}");
+        assert!((weights[0] - 1.0).abs() < 0.01 && weights[4] >= 0.0);
+        for x in [-81.0, -100.0, -1e9, f32::NEG_INFINITY] {
+            assert_eq!(weight_exp(x), 0.0, "{x}");
+        }
+    }
+
+    #[test]
     fn isqrt_is_the_floor() {
         for n in (0..70_000).chain([u32::MAX, u32::MAX - 1, 0xfffe_0001, 0xfffe_0000]) {
             let r = u64::from(isqrt(n));

@@ -1,4 +1,8 @@
 //! Puts a memory.x where the linker looks for it: the machine's RAM, or just that of a tier.
+
+#[path = "../emulated/field_table.rs"]
+mod field_table;
+
 use std::{env, fs, path::Path};
 
 fn main() {
@@ -16,17 +20,7 @@ fn main() {
     let line = "RAM : ORIGIN = 0x20000000, LENGTH = ";
     let memory = memory.replace(&format!("{line}4M"), &format!("{line}{ram}"));
     fs::write(Path::new(&out).join("memory.x"), memory).expect("OUT_DIR can be written");
-    field(Path::new(&out));
+    field_table::put_into(Path::new(&out));
     println!("cargo:rustc-link-search={out}");
     println!("cargo:rerun-if-changed=memory.x");
-}
-
-/// The table that the program `localize` has in its flash; empty where none is named.
-fn field(out: &Path) {
-    let table = env::var_os("BEAMFIX_FIELD").map(|path| {
-        println!("cargo:rerun-if-changed={}", path.display());
-        fs::read(path).expect("BEAMFIX_FIELD can be read")
-    });
-    fs::write(out.join("field.bin"), table.unwrap_or_default()).expect("OUT_DIR can be written");
-    println!("cargo:rerun-if-env-changed=BEAMFIX_FIELD");
 }

@@ -13,7 +13,7 @@ use beamfix_core::{
 
 use crate::{
     lidars::Lidar,
-    object::{Object, Storage, make, object, settings, status},
+    object::{Object, Storage, make, object, pointers, settings, status},
     place::{Mapping, place_mapping},
     types::*,
 };
@@ -75,11 +75,8 @@ unsafe fn make_mapping(
     config: *const Config,
     object: *mut *mut Object,
 ) -> Result<(), Status> {
-    // SAFETY: where not null, each points to what its type says, by the header; the lidars are statics.
-    let (lidar, config, object) = unsafe { (lidar.as_ref(), config.as_ref(), object.as_mut()) };
-    let (Some(lidar), Some(object)) = (lidar, object) else {
-        return Err(Status::NullPointer);
-    };
+    // SAFETY: the caller's promise.
+    let (lidar, config, object) = unsafe { pointers(lidar, config, object)? };
     let storage = Storage::new(storage, bytes)?;
     let config = settings(config, lidar.model)?;
     // SAFETY: the caller's promise.

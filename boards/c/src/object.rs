@@ -329,6 +329,23 @@ pub(crate) unsafe fn make<const N: usize, T: Task<N> + 'static>(
     Ok(object)
 }
 
+/// What the pointers that every object is made with point to; the settings may be null.
+///
+/// # Safety
+/// They are those of a caller of `beamfix_make_odometry`, or of another function that makes an object.
+pub(crate) unsafe fn pointers<'a>(
+    lidar: *const Lidar,
+    config: *const Config,
+    object: *mut *mut Object,
+) -> Result<(&'static Lidar, Option<&'a Config>, &'a mut *mut Object), Status> {
+    // SAFETY: where not null, each points to what its type says, by the header; the lidars are statics.
+    let (lidar, config, object) = unsafe { (lidar.as_ref(), config.as_ref(), object.as_mut()) };
+    let (Some(lidar), Some(object)) = (lidar, object) else {
+        return Err(Status::NullPointer);
+    };
+    Ok((lidar, config, object))
+}
+
 /// # Safety
 /// The pointers are those of a caller of `beamfix_make_odometry`.
 unsafe fn make_odometry<const N: usize>(
@@ -339,11 +356,8 @@ unsafe fn make_odometry<const N: usize>(
     config: *const Config,
     object: *mut *mut Object,
 ) -> Result<(), Status> {
-    // SAFETY: where not null, each points to what its type says, by the header; the lidars are statics.
-    let (lidar, config, object) = unsafe { (lidar.as_ref(), config.as_ref(), object.as_mut()) };
-    let (Some(lidar), Some(object)) = (lidar, object) else {
-        return Err(Status::NullPointer);
-    };
+    // SAFETY: the caller's promise.
+    let (lidar, config, object) = unsafe { pointers(lidar, config, object)? };
     let storage = Storage::new(storage, bytes)?;
     let config = settings(config, lidar.model)?;
     // SAFETY: the caller's promise.
@@ -389,11 +403,8 @@ unsafe fn make_localization<const N: usize>(
     (table, table_bytes): Table,
     object: *mut *mut Object,
 ) -> Result<(), Status> {
-    // SAFETY: where not null, each points to what its type says, by the header; the lidars are statics.
-    let (lidar, config, object) = unsafe { (lidar.as_ref(), config.as_ref(), object.as_mut()) };
-    let (Some(lidar), Some(object)) = (lidar, object) else {
-        return Err(Status::NullPointer);
-    };
+    // SAFETY: the caller's promise.
+    let (lidar, config, object) = unsafe { pointers(lidar, config, object)? };
     // SAFETY: by the header the table stays where it is, unchanged, as long as the object is used.
     let table = unsafe { slice(table, table_bytes)? };
     let storage = Storage::new(storage, bytes)?;

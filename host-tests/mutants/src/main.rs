@@ -34,7 +34,7 @@ struct Options {
     /// Tests that take longer than this, in seconds, are not asked.
     #[arg(long, default_value_t = 20)]
     slowest: u64,
-    /// What has been found is kept here, a line a break; what stands there is not run again.
+    /// What has been found is kept here, a line a break; what stands there is not run again. Remove it when code or tests have changed.
     #[arg(long, default_value = "target/mutants/found.tsv")]
     found: PathBuf,
 }
@@ -46,19 +46,21 @@ fn main() -> Result<()> {
         .nth(2)
         .context("the project's root")?;
     std::env::set_current_dir(root)?;
-    let sources = sources(&options.within)?;
+    let sources = sources()?;
+    let within = |path: &str| path.starts_with(&options.within) && !path.ends_with("/tests.rs");
     let mut all = Vec::new();
-    for (path, text) in &sources {
+    for (path, text) in sources.iter().filter(|(path, _)| within(path)) {
         let mut walk = Walk::new(path, all.last().map_or(1, |m: &Mutant| m.id + 1), None);
         walk.visit_file_mut(&mut syn::parse_file(text)?);
         all.append(&mut walk.found);
     }
-    println!("{} places in {} files", all.len(), sources.len());
+    let files: BTreeSet<&str> = all.iter().map(|mutant| &mutant.file[..]).collect();
+    println!("{} places in {} files", all.len(), files.len());
     let mut chosen = choose(&all, &options);
     let tree = root.join("target/mutants/tree");
     copy(&tree)?;
     loop {
-        put_in(&tree, &sources, &chosen)?;
+        put_in(&tree, &sources, (&all, &chosen))?;
         let refused = refused(&tree, &chosen)?;
         if refused.is_empty() {
             break;
@@ -81,14 +83,13 @@ fn main() -> Result<()> {
 }
 
 /// The library's files, in order, with their text.
-fn sources(within: &str) -> Result<Vec<(String, String)>> {
+fn sources() -> Result<Vec<(String, String)>> {
     let listed = Command::new("git")
         .args(["ls-files", "src/*.rs"])
         .output()?;
     ensure!(listed.status.success(), "git ls-files failed");
     String::from_utf8(listed.stdout)?
         .lines()
-        .filter(|path| path.starts_with(within) && !path.ends_with("/tests.rs"))
         .map(|path| {
             Ok((
                 path.to_string(),
@@ -128,28 +129,31 @@ pub fn room(file: &str) -> &str {
         .map_or(file, |name| name.trim_end_matches(".rs"))
 }
 
-/// The project as it is checked in or changed, without what is built.
+/// The project as it is checked in or changed, without what is built and without the library's sources, which [`put_in`] writes.
 fn copy(tree: &Path) -> Result<()> {
     std::fs::create_dir_all(tree)?;
     let status = Command::new("sh")
         .arg("-c")
-        .arg("git ls-files -co --exclude-standard | tar -cf - -T - | tar -xf - -C \"$0\"")
+        .arg("git ls-files -co --exclude-standard | grep -v '^src/' | tar -cf - -T - | tar -xf - -C \"$0\"")
         .arg(tree)
         .status()?;
     ensure!(status.success(), "the project could not be copied");
     Ok(())
 }
 
-/// Writes the sources with the chosen breaks; files whose text stays the same keep their time.
-fn put_in(tree: &Path, sources: &[(String, String)], chosen: &BTreeSet<u32>) -> Result<()> {
-    let mut first = 1;
+/// Writes the library's sources with the chosen breaks; files whose text stays the same keep their time, so that they are not built
+/// again.
+fn put_in(
+    tree: &Path,
+    sources: &[(String, String)],
+    (all, chosen): (&[Mutant], &BTreeSet<u32>),
+) -> Result<()> {
     for (path, text) in sources {
-        let mut file = syn::parse_file(text)?;
-        let mut walk = Walk::new(path, first, Some(chosen));
-        walk.visit_file_mut(&mut file);
-        let here = walk.found.iter().any(|mutant| chosen.contains(&mutant.id));
-        first = walk.next();
-        let mut broken = if here {
+        let mut here = all.iter().filter(|mutant| mutant.file == *path).peekable();
+        let first = here.peek().map_or(0, |mutant| mutant.id);
+        let mut broken = if here.any(|mutant| chosen.contains(&mutant.id)) {
+            let mut file = syn::parse_file(text)?;
+            Walk::new(path, first, Some(chosen)).visit_file_mut(&mut file);
             prettyplease::unparse(&file)
         } else {
             text.clone()
@@ -161,15 +165,6 @@ fn put_in(tree: &Path, sources: &[(String, String)], chosen: &BTreeSet<u32>) -> 
         }
         write(&tree.join(path), &broken)?;
     }
-    if !sources.iter().any(|(path, _)| path == "src/lib.rs") {
-        let text = std::fs::read_to_string("src/lib.rs")?;
-        write(
-            &tree.join("src/lib.rs"),
-            &format!(
-                "#![allow(warnings)]\n{text}\nextern crate std;\n#[doc(hidden)] pub mod mutant;\n"
-            ),
-        )?;
-    }
     write(&tree.join("src/mutant.rs"), include_str!("switch.rs"))
 }
 
@@ -177,10 +172,22 @@ fn write(path: &Path, text: &str) -> Result<()> {
     if std::fs::read_to_string(path).is_ok_and(|old| old == text) {
         return Ok(());
     }
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder)?;
+    }
     std::fs::write(path, text).with_context(|| path.display().to_string())
 }
 
-/// Breaks that the compiler refuses: each error is put to the break that begins last before it.
+/// How the question for a break begins in the text.
+const ASKS: &str = "mutant::on(";
+
+/// The break that a text which begins with [`ASKS`] asks for.
+fn asked(text: &str) -> Option<u32> {
+    text.strip_prefix(ASKS)?.split("u32").next()?.parse().ok()
+}
+
+/// Breaks that the compiler refuses: each error is put to the break that begins last before it, the first of the file to one that
+/// comes before all.
 fn refused(tree: &Path, chosen: &BTreeSet<u32>) -> Result<BTreeSet<u32>> {
     let checked = Command::new("cargo")
         .args([
@@ -208,23 +215,11 @@ fn refused(tree: &Path, chosen: &BTreeSet<u32>) -> Result<BTreeSet<u32>> {
                 continue;
             };
             let text = std::fs::read_to_string(tree.join(file)).unwrap_or_default();
-            let before = &text[..(end as usize).min(text.len())];
-            if let Some(at) = before.rfind("mutant::on(")
-                && let Some(id) = before[at + 11..]
-                    .split("u32")
-                    .next()
-                    .and_then(|id| id.parse::<u32>().ok())
-            {
-                refused.insert(id);
-            } else if let Some(at) = text[(end as usize).min(text.len())..].find("mutant::on(") {
-                let after = &text[end as usize + at + 11..];
-                refused.extend(
-                    after
-                        .split("u32")
-                        .next()
-                        .and_then(|id| id.parse::<u32>().ok()),
-                );
-            }
+            let (before, after) = text.split_at((end as usize).min(text.len()));
+            refused.extend(before.rfind(ASKS).map_or_else(
+                || after.find(ASKS).and_then(|at| asked(&after[at..])),
+                |at| asked(&before[at..]),
+            ));
         }
     }
     ensure!(

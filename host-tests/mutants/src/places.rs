@@ -1,8 +1,8 @@
 //! Where the library can be broken, and the syntax tree with breaks in it.
 //!
 //! All breaks of a run are built into one program, each behind a question that an environment variable answers:
-//! `a - b` becomes `{ let (l, r) = (a, b); if mutant::on(7) { l + r } else { l - r } }`. A build for each, as `cargo mutants`
-//! makes it, takes half a minute; here one build serves all.
+//! `a - b` becomes `{ let (l, r) = (a, b); if mutant::on(7) { l + r } else { l - r } }`. So one build of the tests serves all, where
+//! `cargo mutants` makes one for each.
 
 use std::collections::BTreeSet;
 
@@ -46,10 +46,6 @@ impl<'a> Walk<'a> {
             closed: 0,
             found: Vec::new(),
         }
-    }
-
-    pub fn next(&self) -> u32 {
-        self.next
     }
 
     /// The next number, if this break is to be put in.
@@ -101,15 +97,12 @@ impl<'a> Walk<'a> {
         signature: &Signature,
         attributes: &[syn::Attribute],
         block: &mut Block,
-        whole: bool,
     ) {
         let closed = signature.constness.is_some() || is_test(attributes);
         let outer = std::mem::replace(&mut self.function, signature.ident.to_string());
         self.closed += usize::from(closed);
         self.visit_block_mut(block);
-        if whole {
-            self.body(signature, block);
-        }
+        self.body(signature, block);
         self.closed -= usize::from(closed);
         self.function = outer;
     }
@@ -197,16 +190,16 @@ impl VisitMut for Walk<'_> {
     }
 
     fn visit_item_fn_mut(&mut self, item: &mut ItemFn) {
-        self.function(&item.sig, &item.attrs, &mut item.block, true);
+        self.function(&item.sig, &item.attrs, &mut item.block);
     }
 
     fn visit_impl_item_fn_mut(&mut self, item: &mut ImplItemFn) {
-        self.function(&item.sig, &item.attrs, &mut item.block, true);
+        self.function(&item.sig, &item.attrs, &mut item.block);
     }
 
     fn visit_trait_item_fn_mut(&mut self, item: &mut syn::TraitItemFn) {
         if let Some(block) = &mut item.default {
-            self.function(&item.sig, &item.attrs, block, true);
+            self.function(&item.sig, &item.attrs, block);
         }
     }
 

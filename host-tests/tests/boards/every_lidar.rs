@@ -7,6 +7,7 @@
 use std::{
     cell::{Cell, RefCell},
     collections::VecDeque,
+    convert::Infallible,
     panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
     rc::Rc,
 };
@@ -454,7 +455,7 @@ impl Hardware for Board {
 struct Pwm(Rc<Cell<u16>>);
 
 impl ErrorType for Pwm {
-    type Error = core::convert::Infallible;
+    type Error = Infallible;
 }
 
 impl SetDutyCycle for Pwm {
@@ -485,7 +486,7 @@ impl Started {
         ));
         app.choose(&self.config);
         let lidar = Ring::<4096>::new();
-        let over = catch_unwind(AssertUnwindSafe(|| {
+        until_over(|| -> Infallible {
             run_any(
                 &mut *app,
                 &self.config,
@@ -493,11 +494,15 @@ impl Started {
                 self.board,
                 self.pwm,
             )
-        }));
-        let Err(over) = over;
-        if !over.is::<Over>() {
-            resume_unwind(over);
-        }
+        });
+    }
+}
+
+/// Runs what never returns, until the board says that the drive is [`Over`].
+fn until_over(run: impl FnOnce() -> Infallible) {
+    let Err(over) = catch_unwind(AssertUnwindSafe(run));
+    if !over.is::<Over>() {
+        resume_unwind(over);
     }
 }
 
@@ -510,7 +515,7 @@ impl WithParser for Started {
             parser,
         ));
         let lidar = Ring::<4096>::new();
-        let over = catch_unwind(AssertUnwindSafe(|| {
+        until_over(|| -> Infallible {
             run(
                 &mut *app,
                 &self.config,
@@ -518,11 +523,7 @@ impl WithParser for Started {
                 self.board,
                 self.pwm,
             )
-        }));
-        let Err(over) = over;
-        if !over.is::<Over>() {
-            resume_unwind(over);
-        }
+        });
         assert_eq!(lidar.lost(), 0);
     }
 }

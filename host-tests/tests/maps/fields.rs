@@ -75,12 +75,12 @@ fn tiles_hold_what_one_table_holds() {
 }
 
 /// A local map of 8 m around `pose`, from scans along a short way, in the frame of `pose`.
-fn local_map(world: &World, pose: TruePose, noise: &mut Noise) -> Grid<Vec<u8>> {
+pub fn local_map(world: &World, pose: TruePose, beams: usize, noise: &mut Noise) -> Grid<Vec<u8>> {
     let shape = Shape::new(160, 160, 0.05, Pose::new(-4.0, -4.0, 0.0)).expect("good");
     let mut local = Grid::new(shape, vec![occupancy::UNKNOWN; shape.len()]).expect("fits");
     for step in 0..5 {
         let way = TruePose::new(0.05 * f64::from(step), 0.0, 0.05 * f64::from(step));
-        let points = points_from(world, pose.then(way), 450, noise);
+        let points = points_from(world, pose.then(way), beams, noise);
         occupancy::update(&mut local, way.into(), &points, &UpdateConfig::DEFAULT);
     }
     occupancy::decide(local.cells_mut());
@@ -95,7 +95,7 @@ fn maps_of_a_corridor_keep_the_guess_along_it() {
     let mut noise = Noise::new(1, 33);
     let [mut whole, mut local] = [0.0, 0.3].map(|x| {
         let place = TruePose::new(x, 0.1, 0.0);
-        local_map(&world, place, &mut noise)
+        local_map(&world, place, 450, &mut noise)
     });
     map::smooth(&mut whole, Kernel::Five);
     map::smooth(&mut local, Kernel::Five);
@@ -128,7 +128,7 @@ fn local_maps_are_found_in_the_map_and_elsewhere_they_do_not_correlate() {
         let mut noise = Noise::new(seed, 32);
         let rough = ros_map::of_world(&world, low, high, 0.05, home::INSIDE).expect("a map");
         let truth = home::home_place(&world, &rough, 0.4, &mut noise);
-        let mut local = local_map(&world, truth, &mut noise);
+        let mut local = local_map(&world, truth, 450, &mut noise);
         map::smooth(&mut local, Kernel::Five);
         let guess = Pose::from(truth)
             * Pose::new(

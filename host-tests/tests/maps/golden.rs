@@ -1,5 +1,6 @@
 //! The bits of fields, localization, particles, presence, sensor models and SLAM, as they are kept.
 
+use super::fields::local_map;
 use super::localization::{drive, place, scan};
 use super::presence as presence_of;
 use super::slam::drive::{drive as follow, path};
@@ -134,8 +135,13 @@ fn fields_give_the_bits_that_are_kept() {
             bytes.map(|(x, y)| tiles.byte(x, y)).collect::<Vec<u8>>(),
         );
 
-        let whole = local_map(&world, truth, &mut noise);
-        let part = local_map(&world, truth.then(TruePose::new(0.2, 0.1, 0.1)), &mut noise);
+        let whole = local_map(&world, truth, 300, &mut noise);
+        let part = local_map(
+            &world,
+            truth.then(TruePose::new(0.2, 0.1, 0.1)),
+            300,
+            &mut noise,
+        );
         kept.push("occupancy", whole.cells());
         let (mut smooth, mut finer) = (whole.clone(), part);
         map::smooth(&mut smooth, Kernel::Five);
@@ -183,19 +189,6 @@ fn distances(grid: &Grid<Vec<u8>>) -> Vec<u8> {
     distance::squared(shape, grid.cells(), occupied, &mut squares, &mut scratch).expect("room");
     distance::roots(&squares, &mut roots);
     roots
-}
-
-/// Five scans along a short way, in the frame of `pose`.
-fn local_map(world: &beamfix_sim::World, pose: TruePose, noise: &mut Noise) -> Grid<Vec<u8>> {
-    let shape = Shape::new(160, 160, 0.05, Pose::new(-4.0, -4.0, 0.0)).expect("good");
-    let mut local = Grid::new(shape, vec![occupancy::UNKNOWN; shape.len()]).expect("fits");
-    for step in 0..5 {
-        let way = TruePose::new(0.05 * f64::from(step), 0.0, 0.05 * f64::from(step));
-        let points = points_from(world, pose.then(way), 300, noise);
-        occupancy::update(&mut local, way.into(), &points, &UpdateConfig::DEFAULT);
-    }
-    occupancy::decide(local.cells_mut());
-    local
 }
 
 /// Two robots that start without a pose, drive, and are carried elsewhere.

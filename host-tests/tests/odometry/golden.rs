@@ -51,21 +51,16 @@ const SCENES: [&str; 20] = [
 #[test]
 fn every_step_of_the_scenes_has_the_bits_that_are_kept() {
     let mut kept = Kept::of("scenes");
-    for name in SCENES {
+    let mut run = |name: &str, runs, what: &str| {
         let all = catalogue::all();
         let entry = all.iter().find(|entry| entry.name == name);
         let entry = entry.unwrap_or_else(|| panic!("no scene {name}"));
-        let push = |_, step: &_, _| kept.push(name, step);
-        scene::run(entry, (1, Runs::Odometry), |config| config, push);
+        let push = |_, step: &_, _| kept.push(what, step);
+        scene::run(entry, (1, runs), |config| config, push);
+    };
+    for name in SCENES {
+        run(name, Runs::Odometry, name);
     }
-    let all = catalogue::all();
-    let entry = all.iter().find(|entry| entry.name == "hall");
-    let push = |_, step: &_, _| kept.push("hall, on a rolling map", step);
-    scene::run(
-        entry.expect("a hall"),
-        (1, Runs::Rolling),
-        |config| config,
-        push,
-    );
+    run("hall", Runs::Rolling, "hall, on a rolling map");
     kept.check();
 }
