@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
-use mcap::records::Record;
+use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::decoder::Layout;
@@ -68,6 +68,46 @@ pub struct Bag {
 #[must_use]
 pub fn is_bag(start: &[u8]) -> bool {
     start.starts_with(MCAP) || start.starts_with(SQLITE)
+}
+
+/// Whether the parts of an MCAP record that state their own length end within it. To be asked first: whoever parses it makes room for
+/// a part before looking whether it is there.
+fn parts_fit(opcode: u8, record: &[u8]) -> bool {
+    let (head, parts) = match opcode {
+        // Name, encoding and text.
+        op::SCHEMA => (2, 3),
+        // Topic, encoding and a table.
+        op::CHANNEL => (4, 3),
+        // Name and type.
+        op::ATTACHMENT => (16, 2),
+        _ => return true,
+    };
+    let Some(mut rest) = record.get(head..) else {
+        return false;
+    };
+    let mut last: &[u8] = &[];
+    for _ in 0..parts {
+        let Some((part, behind)) = part(rest) else {
+            return false;
+        };
+        (last, rest) = (part, behind);
+    }
+    if opcode == op::CHANNEL {
+        // The table is keys and values.
+        while !last.is_empty() {
+            let Some((_, behind)) = part(last) else {
+                return false;
+            };
+            last = behind;
+        }
+    }
+    true
+}
+
+/// Bytes behind their length (u32), and what is behind them.
+fn part(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let (length, rest) = bytes.split_first_chunk()?;
+    rest.split_at_checked(u32::from_le_bytes(*length) as usize)
 }
 
 impl Bag {
@@ -189,6 +229,17 @@ impl Bag {
                 }
                 LinearReadEvent::Record { opcode, data } => (opcode, data),
             };
+            // What nobody reads here need not be whole either.
+            if !matches!(
+                opcode,
+                op::SCHEMA | op::CHANNEL | op::MESSAGE | op::ATTACHMENT
+            ) {
+                continue;
+            }
+            ensure!(
+                parts_fit(opcode, data),
+                "a record's parts are longer than the record"
+            );
             match mcap::parse_record(opcode, data)? {
                 Record::Schema { header, .. } => {
                     schemas.insert(header.id, header.name);
@@ -277,4 +328,33 @@ fn unpacked(data: &[u8]) -> Result<Vec<u8>> {
         bail!("a message of more than {most} bytes");
     }
     Ok(message)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A channel with a topic, an encoding and a table of one pair.
+    fn channel() -> Vec<u8> {
+        let text = |text: &str| [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat();
+        let pair = [text("key"), text("value")].concat();
+        let table = [&(pair.len() as u32).to_le_bytes()[..], &pair].concat();
+        [vec![1, 0, 2, 0], text("/scan"), text("cdr"), table].concat()
+    }
+
+    #[test]
+    fn a_part_that_is_longer_than_its_record_is_seen() {
+        let whole = channel();
+        assert!(parts_fit(op::CHANNEL, &whole));
+        // The lengths of topic, encoding, table, key and value, each one more than there is room for.
+        for at in [4, 13, 20, 24, 31] {
+            let mut longer = whole.clone();
+            longer[at] += whole.len() as u8;
+            assert!(!parts_fit(op::CHANNEL, &longer), "{at}");
+        }
+        for end in 0..whole.len() {
+            assert!(!parts_fit(op::CHANNEL, &whole[..end]), "{end}");
+        }
+        assert!(parts_fit(op::MESSAGE, &[]));
+    }
 }
